@@ -27,7 +27,7 @@ fn main() {
         eprintln!("error: `{name}` is no door; these are: {}", names.join(", "));
         std::process::exit(2);
     };
-    // `door NAME --seeds DIR` writes what AFL++ begins with.
+    // `door NAME --seeds DIR` writes the first inputs for AFL++.
     if let Some(folder) = std::env::args().skip_while(|own| own != "--seeds").nth(1) {
         write_seeds(&name, folder.as_ref()).unwrap_or_else(|error| panic!("{error}"));
         return;

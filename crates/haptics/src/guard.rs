@@ -23,7 +23,8 @@ pub struct Guard {
     pub most_damping: f64,
     /// Largest change of its force [N] from a tick to the next.
     pub most_jump: f64,
-    /// Most energy [J] that it remembers: above what the tissue stores and gives back, F²/2k.
+    /// Largest energy [J] that the guard remembers. It should exceed the energy that the tissue stores and
+    /// gives back, F²/2k.
     pub reserve: f64,
 }
 
@@ -57,7 +58,7 @@ pub struct Observer {
     pub least: f64,
     /// Energy [J] for the guard, held below the reserve.
     left: f64,
-    /// The force [N] by which the guard damped in the last tick.
+    /// Force [N] of the guard's damping in the last tick.
     damping: Vector3<f64>,
 }
 

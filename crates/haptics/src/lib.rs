@@ -1,6 +1,6 @@
-//! Forces for haptic devices at 1 kHz, beside a simulation that takes 2 to 33 ms for a step. The simulation
-//! publishes a [local model](model) of the contact: planes, a compliance, and the force it found. A thread of
-//! its own moves a [proxy] over these planes, which a [virtual coupling](coupling) ties to the device. A
+//! Forces for haptic devices at 1 kHz, next to a simulation that takes 2 to 33 ms for a step. The simulation
+//! publishes a [local model](model) of the contact: planes, a compliance, and the contact force. A separate
+//! thread moves a [proxy] over these planes, which a [virtual coupling](coupling) ties to the device. A
 //! [guard] watches the energy that the device gets back. Devices connect over [datagrams](protocol) on the
 //! loopback interface. The crate knows no solver and no scene. SI units throughout.
 //!

@@ -24,7 +24,7 @@ use crate::renderer::Answer;
 
 /// Silence after which another sender may take the place of the device.
 const RELEASE: Duration = Duration::from_secs(1);
-/// Datagrams that are read for one answer at most.
+/// Largest number of datagrams that are read for one answer.
 const MOST_WAITING: usize = 64;
 /// The shortest wait for a pose.
 const LEAST_PATIENCE: Duration = Duration::from_millis(1);
@@ -38,7 +38,7 @@ pub struct Link {
     counts: Counts,
 }
 
-/// Who sends, and what came last.
+/// Sender of the poses, with its last pose.
 #[derive(Clone, Copy, Debug)]
 struct Sender {
     address: SocketAddr,
@@ -94,10 +94,10 @@ impl Link {
         Ok(true)
     }
 
-    /// Waits for a pose, then reads what else has come.
+    /// Waits for a pose, then reads the other datagrams that have arrived.
     fn newest(&mut self, patience: Duration) -> io::Result<bool> {
         let until = Instant::now() + patience;
-        // It reads once at least: what has come waits, however late its thread is.
+        // At least one read: datagrams wait in the socket, however late the thread is.
         let mut left = patience.max(LEAST_PATIENCE);
         loop {
             if left.is_zero() {

@@ -27,7 +27,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::error::HapticsError;
 
-/// Planes of a model at most.
+/// Largest number of planes of a model.
 pub const MOST_PLANES: usize = 16;
 /// Longest time [s] between two models.
 const LONGEST_PERIOD: f64 = 1.0;

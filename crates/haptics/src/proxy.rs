@@ -15,7 +15,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::model::{LocalModel, MOST_PLANES};
 
-/// Passes over all planes at most.
+/// Largest number of passes over all planes.
 const PASSES: usize = 50;
 /// Change [N] of the force in a pass at which it is found.
 const FOUND: f64 = 1e-9;

@@ -1,7 +1,7 @@
 //! A tick: the pose of the device in, the force out. The renderer knows no clock, so that tests run it as
-//! fast as they like. Over the period of the simulation the force changes linearly from one local model to
-//! the next, f = (1−s) f_old(x) + s f_new(x). So the force does not jump when a model comes in. A device that
-//! leaves the tissue is free at once. The next model is taken when the last one is reached.
+//! fast as they like. The force changes linearly from one local model to the next, over the period of the
+//! simulation: f = (1−s) f_old(x) + s f_new(x). So the force does not jump when a model comes in. A device
+//! that leaves the tissue is free at once. The next model is taken when the last one is reached.
 //!
 //! The coupling κ (p − x) − (B/T) (p′ − x′) = f with κ = K + B/T holds the proxy p; ′ is the tick before. The
 //! proxy has no mass, so the device feels f, less what the [guard](crate::guard) adds, up to the force limit.
@@ -171,7 +171,7 @@ impl Renderer {
     /// [it is wanted](Self::wants_model) makes the force jump.
     pub fn take(&mut self, model: LocalModel) {
         let stuck = match (self.last, model.force() == Vector3::zeros()) {
-            // Slip counts from what gives the present force.
+            // The slip starts at the unloaded place of the present force.
             (Some(last), true) => {
                 last.pose.translation.vector + last.stretch + model.compliance() * last.touch
             }
@@ -254,8 +254,8 @@ impl Renderer {
         before.lerp(&force, self.part)
     }
 
-    /// After a silence of the device: the next pose counts as a first one, and the force of the tissue comes
-    /// up softly. What the device felt last goes as slowly as forces change.
+    /// Restarts after a silence of the device. The next pose counts as a first one, and the force of the
+    /// tissue comes up softly. The last force on the device fades as slowly as forces change.
     pub fn restart(&mut self) {
         (self.last, self.gain) = (None, 0.0);
     }

@@ -71,7 +71,8 @@ pub struct Report {
     pub counts: Counts,
     /// Time from a force to the next; silences are left out.
     pub period: Spread,
-    /// Time from the arrival of a pose to its force; of a replay, from when the pose is due.
+    /// Time from the arrival of a pose to its force. In a replay, the time counts from the instant when the
+    /// pose is due.
     pub latency: Spread,
     /// Time that the force itself takes.
     pub computing: Spread,

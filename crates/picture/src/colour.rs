@@ -148,8 +148,7 @@ pub struct Extremes {
 
 /// Part of the values that the range leaves out at each end.
 const LEFT_OUT: f64 = 0.005;
-/// Part of a value by which others differ from it at most that count as equal: some digits of single
-/// precision.
+/// Relative difference up to which values count as equal: some digits of single precision.
 pub(crate) const EQUAL: f64 = 1e-6;
 
 /// Returns the size below which values of a unit are round-off, on bodies of an extent [m]. For displacements
@@ -169,7 +168,7 @@ impl Extremes {
         Self { noise, ..Self::default() }
     }
 
-    /// The least and the greatest value, with those that the range leaves out.
+    /// Returns the least and the greatest value, including the values outside of the range.
     pub fn ends(&self) -> Option<[f64; 2]> {
         let ends = self.values.iter().map(|&value| [value; 2]).reduce(|[a, b], [c, d]| [a.min(c), b.max(d)]);
         ends.map(|ends| ends.map(f64::from))

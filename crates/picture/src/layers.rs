@@ -23,7 +23,7 @@ impl Layers {
             return None;
         }
         let opacity = |triangle: &[u32; 4]| opacities[(triangle[3] >> KIND) as usize];
-        // A border belongs to what hides more.
+        // A border belongs to the more opaque side.
         let border = |(triangle, &beyond): (&[u32; 4], &u32)| {
             let (own, other) = (opacity(triangle), opacities[beyond as usize]);
             let [a, b, c, word] = *triangle;
@@ -41,8 +41,8 @@ impl Layers {
         Some(Self { list, opaque, corners, order: Vec::new() })
     }
 
-    /// Orders those that are not opaque by their distance from the eye, with points now [m]; in parallel
-    /// projection along the view.
+    /// Sorts the transparent triangles by their distance from the eye, with current points [m]. In parallel
+    /// projection the distance is along the view.
     pub fn sort(&mut self, points: &[[f32; 4]], eye: [f32; 3], towards: Option<[f32; 3]>) -> &[[u32; 4]] {
         let far = |corners: &[u32; 3]| {
             let middle = [0, 1, 2]

@@ -21,7 +21,7 @@ pub struct Legend {
     pub note: String,
     /// Labels with their names, or empty: each has a swatch if colours show labels.
     pub labels: Vec<(i32, String)>,
-    /// Labels of which nothing is seen from here: their names say so.
+    /// Labels that are not visible from here: their names say so.
     pub hidden: BTreeSet<i32>,
     /// Steps of the run that did not converge and were accepted all the same. The note counts them.
     pub unconverged: u64,
@@ -31,7 +31,7 @@ pub struct Legend {
     pub ends: Option<[f64; 2]>,
 }
 
-/// Part of the picture's width that names of labels take at most.
+/// Largest part of the picture's width for the names of labels.
 const WIDEST: f32 = 0.3;
 /// Beginning and end of the swatches, as parts of the picture's height.
 const SWATCHES: [f32; 2] = [0.12, 0.92];

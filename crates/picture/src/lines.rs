@@ -53,7 +53,7 @@ impl Line {
 
 /// The most edges of a cell.
 pub(crate) const MOST_EDGES: usize = 12;
-/// Cubes that fibres are chosen from, one of each, lie along a surface in about this number.
+/// Approximate number of cubes along a surface. Each cube shows one fibre.
 const CUBES: f64 = 1500.0;
 /// Length of a fibre over the distance to the next.
 const LENGTH: f64 = 0.8;

@@ -15,7 +15,7 @@ pub enum Marked {
     Held,
     /// A node that is moved.
     Moved,
-    /// A node under a plate, of which only the mean is moved.
+    /// A node under a plate, which moves only the mean of its nodes.
     Plate,
     /// The weight of all [N], at its centre.
     Weight(Vector3),
@@ -40,7 +40,7 @@ impl Marked {
     }
 }
 
-/// At most 300 marks of each kind, spread evenly over those there are.
+/// Returns at most 300 marks of each kind, spread evenly over all.
 pub fn some_of(marks: Vec<Mark>) -> Vec<Mark> {
     let kind = |mark: &Mark| match mark.1 {
         Marked::Held => 0,

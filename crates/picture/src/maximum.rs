@@ -45,7 +45,7 @@ pub fn largest_seen(
     ends.filter(|(least, most)| most.1 - least > EQUAL * most.1.abs().max(least.abs())).map(|(_, most)| most)
 }
 
-/// A largest value as it is drawn.
+/// A largest value with the data to draw it.
 pub(crate) struct Maximum<'a> {
     /// Its place [m].
     pub place: Vector3,

@@ -1,11 +1,11 @@
-//! Ambient occlusion: what arrives of the light from all sides, in a map of the screen that is made before
+//! Ambient occlusion: the part of the light from all sides that arrives, in a map of the screen made before
 //! each picture.
 
 use std::ops::Range;
 
 /// Rows of the map, whatever the size of the picture: light from all sides changes slowly.
 pub(crate) const ROWS: u32 = 240;
-/// Columns at most, which every device supports.
+/// Largest number of columns, which every device supports.
 const WIDEST: u32 = 2048;
 /// Distance over which things take light away, over the height of the picture.
 pub(crate) const REACH: f64 = 0.07;

@@ -84,8 +84,8 @@ fn depth_over_reach(place: vec3<f32>) -> f32 {
 
 @group(1) @binding(0) var rough: texture_2d<f32>;
 
-// The mean over four by four pixels, which takes away the pattern of the spirals; those in another depth do
-// not count.
+// The mean over four by four pixels, which removes the pattern of the spirals. Pixels at another depth do not
+// count.
 @fragment
 fn smoothed(at: Sky) -> @location(0) vec2<f32> {
     let pixel = vec2<i32>(at.clip.xy);

@@ -23,8 +23,8 @@ pub struct Frame {
     pub critical: Option<u32>,
 }
 
-/// Off screen, in four samples a pixel. Colours are mixed as coded, as in windows: what one sees through
-/// looks the same in both.
+/// Off screen, in four samples a pixel. Colours are mixed in coded form, as in windows, so that transparent
+/// bodies look the same in both.
 const TARGET: Target =
     Target { format: wgpu::TextureFormat::Rgba8Unorm, depth: wgpu::TextureFormat::Depth32Float, samples: 4 };
 

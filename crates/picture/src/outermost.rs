@@ -1,8 +1,8 @@
-//! The outermost of many points: those that a camera has to see.
+//! The outermost of many points: the points that a camera has to see.
 
 use pliant_geometry::Vector3;
 
-/// Points of which no more are kept than a camera needs: inner ones do not change where it stands.
+/// Points for the placement of a camera. Inner points, which do not change it, may be dropped.
 #[derive(Clone, Debug, Default)]
 pub struct Outermost {
     points: Vec<Vector3>,

@@ -1,5 +1,5 @@
-//! Regions of a picture (labels, bodies, obstacles and tools): which are hidden, through which one sees, and
-//! what colours them.
+//! Regions of a picture (labels, bodies, obstacles and tools): hidden ones, transparent ones, and their
+//! colours.
 
 use pliant_geometry::Region;
 
@@ -33,7 +33,7 @@ impl Default for Coat {
     }
 }
 
-/// Regions that are hidden, and those with a look of their own.
+/// Hidden regions, and regions with their own look.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Regions {
     /// Regions whose cells are left out.

@@ -179,7 +179,7 @@ impl Kind {
         let color = sum(SrcAlpha, OneMinusSrcAlpha);
         match self {
             Self::Behind | Self::Solid => None,
-            // What covers in part counts so, but for a veil.
+            // A partly covering surface counts by its coverage, except for a veil.
             Self::Veil => Some(wgpu::BlendState { color, alpha: sum(Zero, One) }),
             _ => Some(wgpu::BlendState { color, alpha: sum(One, OneMinusSrcAlpha) }),
         }

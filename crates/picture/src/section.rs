@@ -108,7 +108,7 @@ impl Section {
     pub fn values(&self, subject: &Subject, regions: &Regions) -> impl Iterator<Item = f64> {
         let shows = subject.showing(regions);
         let seen = self.corners.iter().filter(move |corner| shows[(corner.edges >> KIND) as usize]);
-        // What has no value is drawn with a large one.
+        // Missing values are drawn as a large one.
         seen.map(|corner| f64::from(corner.point[3])).filter(|value| *value < 1e30)
     }
 

@@ -217,7 +217,7 @@ fn quoted(names: &[String]) -> String {
 pub struct Look {
     /// The field that colours show (see [`nodal_values`]); `None` for the colour of tissue.
     pub field: Option<String>,
-    /// Regions that are hidden, and those with a look of their own.
+    /// Hidden regions, and regions with their own look.
     pub regions: Regions,
     /// The style of bodies. Without a range, the values decide.
     pub style: Style,
@@ -225,7 +225,7 @@ pub struct Look {
     pub camera: Camera,
     /// The target [m], unless fitted.
     pub target: Option<Vector3>,
-    /// Magnification of what fits; 0 counts as 1.
+    /// Magnification compared with a camera that fits the body; 0 counts as 1.
     pub zoom: f64,
     /// The series whose constraints and loads are marked; `None` for no marks.
     pub marks: Option<Series>,
@@ -249,7 +249,7 @@ struct Common {
     largest: [f64; 2],
     /// True if a part of a body has no value.
     missing: bool,
-    /// Labels of which something is seen.
+    /// Visible labels.
     labels: BTreeSet<i32>,
 }
 

@@ -8,7 +8,7 @@ struct View {
     up: vec4<f32>,
     towards: vec4<f32>,
     eye: vec4<f32>,
-    // What lies on the side of the normal is taken away.
+    // Everything on the side of the normal is cut away.
     plane: vec4<f32>,
     // First value, 1 / span; 1 for colours of values, 2 for colours of labels; whether colours are coded as
     // sRGB here.
@@ -158,8 +158,8 @@ fn seen_normal(at: Corner, front: bool, eye: vec3<f32>) -> vec3<f32> {
     return normalize(normal - min(dot(normal, eye) - 1.0e-3, 0.0) * eye);
 }
 
-// Things are drawn from outside, so that one sees through a half-space from its back; those that hold bodies
-// inside from there. The margin keeps outlines of round things whole.
+// Things are drawn from outside, so that a half-space is transparent from its back. Things that hold bodies
+// are drawn from inside. The margin keeps outlines of round things whole.
 fn is_behind(at: Corner) -> bool {
     let facing = dot(normalize(at.normal), towards_eye(at.position));
     return is_thing(at) && select((facing < -0.2), (facing > 0.0), (at.edges & 32u) != 0u);
@@ -175,7 +175,7 @@ fn no_colour(at: Corner) -> bool {
     return is_tissue(at) || (kinds[at.edges >> 8u].light.r < 0.0 && at.value > 1.0e30);
 }
 
-// Light of its own colour, else of the value.
+// Light of the fixed colour, or else of the value.
 fn colour_at(at: Corner) -> vec3<f32> {
     let own = kinds[at.edges >> 8u].light.rgb;
     if own.r >= 0.0 {
@@ -300,7 +300,7 @@ fn noise(place: vec3<f32>) -> vec4<f32> {
     return vec4(slope, value);
 }
 
-// Sum of octaves of noise from a frequency on; those finer than pixels are left out.
+// Sum of octaves of noise from a frequency on. Octaves finer than pixels are left out.
 fn octaves(place: vec3<f32>, lowest: f32, count: i32, pixel: f32) -> vec4<f32> {
     var sum = vec4(0.0);
     var frequency = lowest;

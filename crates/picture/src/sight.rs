@@ -13,7 +13,7 @@ use crate::subject::{KIND, Subject};
 /// Distance from a place, over the size of the drawn body, below which nothing hides the place. The faces
 /// around it lie there.
 const NEAR: f64 = 1e-5;
-/// Triangles of a label that are looked for, at most, spread evenly over those there are.
+/// Largest number of tested triangles of a label, spread evenly over all.
 const MOST: usize = 200;
 
 /// Things that hide places from a camera.
@@ -83,7 +83,7 @@ impl<'s> Sight<'s> {
         !surface && !cut()
     }
 
-    /// Labels in colours of their own of which no part is seen, of some labels.
+    /// Returns the given labels that have their own colours and are nowhere visible.
     pub fn hidden_labels(&self, regions: &Regions, labels: impl Iterator<Item = i32>) -> BTreeSet<i32> {
         let of_label = |number: u32, label: i32| {
             let kind = self.subject.kinds[number as usize];

@@ -67,7 +67,7 @@ fn edges_of(block: Option<&CellBlock>, cell: u32) -> u32 {
     own.map_or(0b111, |&bits| bits as u32 & 0b111)
 }
 
-/// Cell data: 1 of obstacles and tools, 2 of those whose inside bodies touch, 0 of bodies.
+/// Cell data: 1 for obstacles and tools, 2 for things whose inside bodies touch, 0 for bodies.
 pub(crate) const THING: &str = "thing";
 
 /// Marks the faces of things that bodies touch: they are drawn from the front.
@@ -653,7 +653,7 @@ pub(crate) mod tests {
         };
         assert_eq!((of(0), of(1)), (6, 6), "two faces of each tet are on the boundary");
         assert_eq!([subject.word(0), subject.word(2), subject.word(6)], [0, 1 << KIND, 0]);
-        // Without what hides them, the faces between the labels are drawn.
+        // Without the cells that hide them, the faces between the labels are drawn.
         mesh.drop_regions(&[Region::Label(1)]);
         let rest = Subject::new(&mesh);
         assert!(rest.kinds == [kind(2)] && rest.triangle_count() > 6 && rest.beyond.is_empty());
@@ -695,7 +695,7 @@ pub(crate) mod tests {
         assert_eq!(deformed_points(&mesh)[1], mesh.points[1] + Vector3::repeat(0.5));
     }
 
-    /// A tool beside a wall: its faces are marked, and what its points moved is no value of the field.
+    /// A tool near a wall: its faces are marked, and the movement of its points is no value of the field.
     #[test]
     fn things_are_marked_and_have_no_values() {
         let mut mesh = Mesh { points: vec![Vector3::zeros(); 7], ..Mesh::default() };

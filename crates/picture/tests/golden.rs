@@ -318,7 +318,7 @@ fn organs_shine_each_in_its_way() {
         let picture = look.picture(&graphics, &organs(true), None, 0.25).unwrap();
         let covered = picture.rgba.chunks(4).filter(|pixel| pixel[3] == 255);
         let light = |byte: u8| ((f64::from(byte) / 255.0 + 0.055) / 1.055).powf(2.4);
-        // Over what a white lamp makes of the same colour.
+        // Light above the reflection of a white lamp on this colour.
         let own = light(material.colour()[2]);
         covered.map(|pixel| light(pixel[2])).fold(0.0, f64::max) - own
     };

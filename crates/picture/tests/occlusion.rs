@@ -69,7 +69,7 @@ fn a_fold_is_darker_and_a_free_plane_is_not() {
     for free in [[0.6, 0.5, 0.0], [0.97, 0.5, 0.0], [1.0, 0.5, -0.03], [0.0, 0.5, 0.37]] {
         assert_eq!(part(free), 1.0, "at {free:?}");
     }
-    // The same in a section, whose plane is free.
+    // The occlusion of a section, whose plane is free.
     let clip = Plane::through(&Vector3::new(0.0, 0.5, 0.0), &-Vector3::y());
     let [lit, occluded] = [false, true].map(|occlusion| taken(Style { occlusion, clip, ..plain }));
     assert!(green(&occluded, &camera, [0.01, 0.7, 0.0]) < 0.87 * green(&lit, &camera, [0.01, 0.7, 0.0]));
@@ -86,7 +86,7 @@ fn processor_time() -> Option<f64> {
     Some(ticks / 100.0)
 }
 
-/// Prints what pictures take with and without, in turn.
+/// Prints the time of pictures with and without occlusion, in turn.
 #[test]
 #[ignore = "measures"]
 fn cost() {

@@ -1,6 +1,6 @@
-//! Scenes whose state lies on a GPU: their points are found and drawn there. What needs ordinary memory
-//! (energies, forces, the range of colours, whether all is sound, fields other than displacements) is
-//! inspected now and then.
+//! Scenes whose state lies on a GPU: their points are computed and drawn there. Energies, forces, the range
+//! of colours, checks and fields other than displacements need ordinary memory. They are inspected now and
+//! then.
 
 use std::time::{Duration, Instant};
 
@@ -23,7 +23,7 @@ pub(crate) struct Seen {
     pub points: Vec<Vector3>,
     /// Values of the field that is shown; empty for none.
     pub values: Vec<f64>,
-    /// The cell with the smallest step, where that is asked for.
+    /// Cell with the smallest stable step, if the view asks for it.
     pub critical: Option<u32>,
     /// Energies [J].
     pub energies: Energies,
@@ -35,7 +35,7 @@ pub(crate) struct Seen {
     pub held: Vec<[[f64; 3]; 2]>,
     /// Index of each hand in [`Self::held`].
     pub hands: [Option<usize>; 2],
-    /// Forces of contacts, where they are asked for.
+    /// Forces of contacts, if the view asks for them.
     pub contacts: Vec<PointForce>,
     /// Marks of constraints and loads, if the view asks for them.
     pub marks: Vec<Mark>,

@@ -98,7 +98,7 @@ struct Tool {
     opening: f64,
 }
 
-/// Edges within which a hand holds the surface, and by which its spring gets longer at most.
+/// Edges within which a hand holds the surface, and the most by which its spring gets longer.
 const REACH: f64 = 2.0;
 /// Simulated time [s] in which a tool follows the hand: a frame.
 const FOLLOWS: f64 = 1.0 / 60.0;
@@ -139,7 +139,7 @@ impl Tool {
 /// Data of a grip from the moment when it was taken.
 #[derive(Clone, Copy, Debug)]
 struct Taken {
-    /// Stiffness asked for [N/m].
+    /// Desired stiffness [N/m].
     stiffness: f64,
     /// Vector from the middle of the held surface to the point that was taken [m].
     offset: Vector3,
@@ -185,8 +185,8 @@ fn edge(corners: [u32; 3], live: &Live) -> f64 {
     if count > 0 { sum / f64::from(count) } else { 0.0 }
 }
 
-/// The surface around a point, as a combination of nodes: what lies within two edges of it at rest and hangs
-/// together with it.
+/// Returns the surface around a point, as a combination of nodes. It is the part connected to the point
+/// within two edges at rest.
 fn around(point: &Point, subject: &Subject, live: &Live) -> Option<Nodes> {
     let triangles: Vec<[u32; 3]> = subject.triangles().collect();
     let corners = *triangles.get(point.triangle as usize)?;
@@ -247,8 +247,8 @@ impl Hold {
         self.hands.iter().filter(|holds| matches!(holds, Holds::Tissue)).count()
     }
 
-    /// Does what a hand does, or pins; the stiffness stays below the bound of stable steps. False where the
-    /// solver knows no hand.
+    /// Performs an action of a hand or a pin; the stiffness stays below the bound of stable steps. Returns
+    /// false if the solver supports no hand.
     pub fn take(&mut self, which: Which, does: &Hand, subject: &Subject, live: &mut Live) -> bool {
         let grip = |point: &Point, stiffness| grip(point, stiffness, subject, &*live);
         let mut found = true;
@@ -337,7 +337,7 @@ impl Hold {
         std::mem::replace(&mut grip.place, place) != place
     }
 
-    /// Holds the same in another run.
+    /// Holds the same points in another run.
     pub(crate) fn grip_again(&mut self, live: &mut Live) -> bool {
         for hand in &mut self.hands {
             if matches!(hand, Holds::Tool(tool) if live.simulation.tool(&tool.name).is_none()) {

@@ -1,6 +1,6 @@
-//! The window: a scene played in real time on a thread of its own, pulled by hand and pinned, looked at from
-//! all sides. All but the window itself works without one: [`Session`] plays, [`pick`] finds what lies under
-//! a pixel, [`replay()`] repeats what a hand did.
+//! The window: a scene played in real time on its own thread, pulled by hand and pinned, looked at from all
+//! sides. Everything but the window itself works without a screen. [`Session`] plays, [`pick`] finds the
+//! point under a pixel, [`replay()`] repeats the actions of a hand.
 
 mod beside;
 mod device;

@@ -61,7 +61,7 @@ fn described(sections: &[Section], kind: &str, name: Option<&str>) -> Vec<Descri
     section.map(|section| describe(&section.schema)).unwrap_or_default()
 }
 
-/// The numbers in a value, with those in arrays and tables within it.
+/// Collects the numbers in a value, and in arrays and tables within it.
 fn collect(path: Vec<String>, node: &Node, described: Option<&Described>, found: &mut Vec<Parameter>) {
     let within = |key: &str| [&path[..], &[key.to_owned()]].concat();
     let value = match &node.value {
@@ -87,10 +87,10 @@ fn collect(path: Vec<String>, node: &Node, described: Option<&Described>, found:
     found.push(Parameter { number: Number { path, value }, unit, meaning });
 }
 
-/// The world of a scene with other numbers. It is built and planned anew, which takes a while.
+/// Builds the world of a scene with other numbers. The world is also planned anew, which takes a while.
 ///
 /// # Errors
-/// What the scene says of numbers that cannot be.
+/// If the scene rejects the numbers.
 pub fn with_numbers(scene: &Scene, numbers: &[Number]) -> Result<World, String> {
     let mut source = scene.source.clone();
     for Number { path, value } in numbers {

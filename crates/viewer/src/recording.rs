@@ -83,7 +83,7 @@ pub struct Move {
     pub evaluated: bool,
     /// Wall time since the first one [s].
     pub seconds: f64,
-    /// Wall time from when it was asked for to the end of the first step in which it acted [s]; `None` while
+    /// Wall time from the request to the end of the first step in which the action acted [s]; `None` while
     /// the run stood still.
     pub lag: Option<f64>,
     /// The action.
@@ -103,8 +103,8 @@ pub struct Recording {
     pub of: u64,
 }
 
-/// The first bytes of a file of a recording, with the version of what follows; the CRC-32 of all before them
-/// are the last four.
+/// First bytes of a recording's file, with the version of the format. The last four bytes are the CRC-32 of
+/// all bytes before them.
 const MAGIC: [u8; 8] = *b"\x89PLREC2\n";
 /// Bytes of the checksum.
 const CRC: usize = 4;

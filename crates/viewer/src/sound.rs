@@ -10,17 +10,17 @@ use crate::hand::Hold;
 
 /// Simulated time [s] from one to the next.
 const EVERY: f64 = 0.25;
-/// Steps from one to the next at most.
+/// Largest number of steps between states.
 const MOST_STEPS: u64 = 1000;
 /// Largest number of states, besides the one at the start.
 const MOST: usize = 16;
 /// Memory [bytes] that all of them take, about.
 const MEMORY: usize = 256 << 20;
-/// Memory [bytes] that one takes for each node, about: displacements, increments, the internal forces of
-/// the last two instants and what laws remember.
+/// Approximate memory [bytes] of a state for each node. It holds displacements, increments, the internal
+/// forces of the last two instants and the history of laws.
 const NODE: usize = 250;
 
-/// A state, and what the run was then.
+/// A state of a run, with the data of that instant.
 #[derive(Clone)]
 pub(crate) struct Sound {
     pub state: State,
@@ -121,8 +121,8 @@ impl SoundStates {
         place.map_or(self.first.as_mut(), |place| self.later.get_mut(place))
     }
 
-    /// The state to go back to after a break: the newest one that the run has not gone back to. `None` where
-    /// hands did nothing and the run breaks all the same.
+    /// Returns the state to go back to after a break: the newest one that the run has not gone back to.
+    /// `None` if no hand acted and the run breaks all the same.
     pub fn take(&mut self) -> Option<Sound> {
         let newest = self.later.pop_back();
         let is_lost = newest.is_none() && self.at_first && !self.touched;

@@ -1,6 +1,6 @@
-//! A restless hand: random drags, each of a second in sixty pulls, as a mouse sends them. In a process of its
-//! own, whose memory is watched. An hour of it takes minutes: `cargo test -p pliant -p pliant-viewer
-//! --features pliant/viewer --test dragging -- --ignored`.
+//! A restless hand: random drags, each of a second in sixty pulls, as a mouse sends them. The tests have
+//! their own process, whose memory is measured. An hour of dragging takes minutes: `cargo test -p pliant -p
+//! pliant-viewer --features pliant/viewer --test dragging -- --ignored`.
 
 #![allow(unsafe_code)] // The allocator that counts hands every call on.
 
@@ -20,7 +20,7 @@ use support::{BALL, LIVER, subject, wait, wait_up_to, world};
 
 /// Pulls of a drag, a sixtieth of a second each.
 const PULLS: u32 = 60;
-/// A drag takes that long at most, on a machine that does much else.
+/// Largest duration of a drag, on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(900);
 /// Bytes by which the peak of the allocated memory may differ. Lists of held nodes are some KB long. A leak
 /// of 100 bytes a drag would show within 700 drags.
@@ -90,7 +90,7 @@ impl Until {
     }
 }
 
-/// A body that is dragged, and what came of it so far.
+/// A dragged body, with its results so far.
 struct Dragged {
     session: Session,
     subject: Subject,
@@ -118,8 +118,8 @@ impl Dragged {
         Self { session, subject, size, steps, random: Random::new(1), broken: 0, strongest: 0.0 }
     }
 
-    /// A drag of a second at a place and with a stiffness of its own; whether the run is where the hand
-    /// brought it.
+    /// Drags for a second at a random place with a random stiffness. Returns true if the run is where the
+    /// hand brought it.
     fn drag(&mut self, drag: u64) -> bool {
         let Self { session, random, .. } = self;
         let triangle = (random.part() * self.subject.triangle_count() as f64) as u32;
@@ -127,7 +127,7 @@ impl Dragged {
         session.order(Order::Hand(Hand::Take(Point { triangle, weights: [0.2, 0.3, 0.5] }, stiffness)));
         let taken = wait(session, |frame| !frame.held.is_empty() || frame.failure.is_some());
         assert_eq!(taken.failure, None, "before drag {drag}");
-        // What the last steps of a broken drag did counts, too.
+        // The last steps of a broken drag count, too.
         self.broken = taken.breaks;
         let mut place = Vector3::from(taken.held[0][0]);
         let goal = taken.steps + self.steps * u64::from(PULLS);
@@ -172,10 +172,10 @@ fn assert_is_told(message: &str, drag: u64) {
     assert!(is_told && message.contains("went back to"), "in drag {drag}: {message}");
 }
 
-/// Drags of a second each at a body, each at a place of its own, with a stiffness between 20 and 500 N/m. The
-/// run never ends: after a pull that would break it, it is where it was before. All that is shown is a
-/// number, and after the first tenth memory no longer grows. Returns how often the run went back, and how
-/// many drags there were.
+/// Drags a body for a second each, at random places, with a stiffness between 20 and 500 N/m. The run never
+/// ends: after a pull that would break it, it goes back to an earlier state. Every shown value is a number,
+/// and after the first tenth memory no longer grows. Returns how often the run went back, and the number of
+/// drags.
 fn drag(text: &str, until: &Until) -> [u64; 2] {
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let mut dragged = Dragged::new(world(text));

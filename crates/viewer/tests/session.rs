@@ -1,5 +1,5 @@
-//! The window without a window: a scene is played on its own thread, picked, pulled and pinned; what was done
-//! is repeated.
+//! A session without a window. A scene is played on its own thread, picked, pulled and pinned. Replays repeat
+//! the actions.
 
 mod support;
 
@@ -38,7 +38,7 @@ fn a_hundred_known_pixels_pick_the_right_triangles() {
         for (corners, triangle) in subject.triangles().zip(0..) {
             let [a, b, c] = corners.map(|point| subject.points[point as usize]);
             let (middle, normal) = ((a + b + c) / 3.0, (b - a).cross(&(c - a)).normalize());
-            // On a convex body what faces the eye is seen.
+            // On a convex body the points that face the eye are visible.
             let (from, along) = camera.ray(camera.place(&middle, 1.6).unwrap(), 1.6);
             if normal.dot(&along) > -0.2 {
                 continue;
@@ -149,7 +149,7 @@ fn the_hand_pulls_with_its_spring_and_the_base_holds_against_it() {
     let recording = session.end().unwrap();
     assert_eq!((recording.steps, recording.moves.len()), (3000, 3));
 
-    // Repeated twice: the same bits, and the force of the hand is what the base holds.
+    // Two replays give the same bits, and the force of the hand equals the reaction at the base.
     let world = support::world(BALL);
     let mut held = recording;
     held.moves.pop();
@@ -435,10 +435,10 @@ fn a_law_made_stiffer_while_it_is_pulled_ends_as_if_it_had_been_from_the_start()
     assert!(pulls.norm() > 1.1 * force.norm() && (held - point).norm() > 1e-4, "{force:?} {pulls:?}");
     let mut other = Session::start(with_numbers(&soft.scene, &stiffer).unwrap(), || ()).unwrap();
     let [expected, _] = pull(&mut other, tip, 6000);
-    // What damping leaves of the motion.
+    // Motion that remains after the damping.
     assert!((held - expected).norm() < 1e-6, "{held:?} {expected:?}");
 
-    // What was recorded comes to the same bits, with the change in its place.
+    // The replay gives the same bits, with the change in its place.
     let recording = session.end().unwrap();
     assert!(recording.moves.iter().any(|then| then.done == Done::Numbers(stiffer.to_vec())));
     let once = replay(&soft, &recording).unwrap();

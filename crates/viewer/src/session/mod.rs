@@ -49,18 +49,18 @@ pub enum Order {
     Back(u64),
     /// Simulated seconds a second.
     Speed(f64),
-    /// Changes what the first hand or a pin holds.
+    /// Changes the grip of the first hand, or a pin.
     Hand(Hand),
-    /// Changes what the second hand or a pin holds.
+    /// Changes the grip of the second hand, or a pin.
     Second(Hand),
     /// Continues from the current state with another world, from the next step on. The numbers are those that
     /// differ from the file.
     Change(Box<World>, Vec<Number>),
-    /// Finds where bodies are held, moved and loaded in each frame, or not any more.
+    /// Turns the marks of constraints and loads in each frame on or off.
     Marks(bool),
     /// Follows a point.
     Probe(Point),
-    /// Follows no point any more but those that the scene names.
+    /// Follows only the points that the scene names.
     ForgetProbes,
     /// Records the user's actions from this moment.
     Record,
@@ -104,7 +104,7 @@ pub struct Frame {
     pub points: Vec<Vector3>,
     /// Values of the field that is shown; empty for none.
     pub values: Vec<f64>,
-    /// The cell with the smallest step, where that is asked for.
+    /// Cell with the smallest stable step, if the view asks for it.
     pub critical: Option<u32>,
     /// Energies [J].
     pub energies: Energies,
@@ -116,7 +116,7 @@ pub struct Frame {
     pub held: Vec<[[f64; 3]; 2]>,
     /// Index of each hand in [`Self::held`]; `None` for a hand that holds nothing.
     pub hands: [Option<usize>; 2],
-    /// Forces of contacts on the nodes, where they are asked for.
+    /// Forces of contacts on the nodes, if the view asks for them.
     pub contacts: Vec<PointForce>,
     /// Marks of constraints and loads, if the view asks for them.
     pub marks: Vec<Mark>,
@@ -143,7 +143,7 @@ pub struct Frame {
     pub input_lag: Option<f64>,
     /// Number of times that a pull broke the run, which then went back to an earlier state.
     pub breaks: u64,
-    /// The numbers that are others than in the file.
+    /// Numbers that differ from the file.
     pub numbers: Vec<Number>,
     /// Number of times that changed numbers broke the run at once. The run then continued with the earlier
     /// numbers.
@@ -195,7 +195,7 @@ pub(crate) fn enter(world: &World, from: Option<(World, Option<State>)>) -> Resu
 }
 
 impl Session {
-    /// Starts to play a scene, snapshot still. `wake` is called after each frame.
+    /// Starts the solver's thread for a scene, paused at first. `wake` is called after each frame.
     pub fn start(world: World, wake: impl Fn() + Send + 'static) -> std::io::Result<Self> {
         let (input, frames) = triple_buffer::TripleBuffer::new(&Frame::default()).split();
         let (orders, inbox) = channel();
@@ -210,17 +210,17 @@ impl Session {
         Ok(Self { orders, samples, frames, stop, thread: Some(thread) })
     }
 
-    /// Gives an order; it is forgotten where the solver has ended.
+    /// Sends an order. It is ignored if the solver has ended.
     pub fn order(&self, order: Order) {
         let _ = self.orders.send((Instant::now(), order));
     }
 
-    /// The newest frame; whether it is a new one.
+    /// Returns true if the newest frame is a new one, and the frame.
     pub fn look(&mut self) -> (bool, &Frame) {
         (self.frames.update(), self.frames.output_buffer())
     }
 
-    /// The samples since the last call, in the order in which they were taken.
+    /// Returns the samples since the last call, in the order in which they were taken.
     pub fn samples(&self) -> impl Iterator<Item = Sample> + '_ {
         self.samples.try_iter()
     }
@@ -232,8 +232,8 @@ impl Session {
 }
 
 impl Session {
-    /// Ends it; what was done since it was told to record or was last reset. `None` after a panic, which was
-    /// told there.
+    /// Ends the session. Returns the actions since recording began or the last reset. `None` after a panic,
+    /// whose message has been printed.
     pub fn end(&mut self) -> Option<Recording> {
         self.order(Order::Quit);
         self.stop.ask();

@@ -69,7 +69,7 @@ pub(super) struct Playback {
     pub(super) note: Option<String>,
     pub(super) pace: Pace,
     pub(super) playing: bool,
-    /// Steps that were asked for one by one.
+    /// Single steps that were requested but not done yet.
     pub(super) owed: u64,
     /// Actions that no step has felt yet: wall time, number of steps after which the action acts, and index
     /// in the recording.
@@ -213,7 +213,7 @@ impl Playback {
         self.playing && self.failure.is_none()
     }
 
-    /// Keeps what was done at an instant, whose forces were found or not.
+    /// Records an action. `evaluated` is true if the forces of that instant were computed before.
     pub(super) fn record(&mut self, evaluated: bool, sent: Instant, done: Done) {
         let Some(recording) = &mut self.recording else { return };
         let started = *self.started.get_or_insert(sent);
@@ -221,7 +221,7 @@ impl Playback {
         recording.moves.push(Move { steps: self.steps, evaluated, seconds, lag: None, done });
     }
 
-    /// After a step: what was asked for before has been felt.
+    /// Sets the lags after a step, which has felt the earlier actions.
     pub(super) fn feel(&mut self) {
         for &(sent, _, number) in self.waiting.iter().filter(|(_, from, _)| self.steps > *from) {
             let lag = sent.elapsed().as_secs_f64();

@@ -177,7 +177,7 @@ impl<'s> Player<'s> {
         player
     }
 
-    /// The run as it is before its numbers change; `None` of one that has failed.
+    /// Returns the run before its numbers change; `None` if it has failed.
     pub(super) fn former(&mut self) -> Option<Former> {
         let playback = &self.playback;
         let recorded = |recording: &Recording| [recording.moves.len(), recording.breaks.len()];
@@ -239,7 +239,7 @@ impl<'s> Player<'s> {
                     if let Some(left) = self.obey(sent, order) {
                         return left;
                     }
-                    // Steps that were asked for come before later orders.
+                    // Requested steps come before later orders.
                     next = if self.playback.owed > 0 { None } else { inbox.try_recv().ok() };
                 }
             }
@@ -383,7 +383,7 @@ impl<'s> Player<'s> {
         Ok(())
     }
 
-    /// Finds what can be taken hold of, and what will move by itself.
+    /// Finds the triangles that hands can take, the triangles of tools, and the paths of moving things.
     pub(super) fn find_movable(&mut self) {
         self.ways = Arc::new(self.live.ways());
         let corners: Vec<u32> = self.subject.triangles().map(|corners| corners[0]).collect();
@@ -432,7 +432,7 @@ impl<'s> Player<'s> {
         }
     }
 
-    /// Keeps the state where one is due.
+    /// Keeps the state if one is due.
     pub(super) fn keep_sound(&mut self) {
         let (playback, simulation) = (&self.playback, &mut self.live.simulation);
         if !self.sound.is_due(playback.steps, self.world.step()) {

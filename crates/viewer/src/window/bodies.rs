@@ -157,7 +157,7 @@ pub(super) struct Listed {
 }
 
 impl Listed {
-    /// Draws it; how a picture shows what it says.
+    /// Draws the list, and returns the hidden regions and their looks for a picture.
     pub fn edit(&mut self, ui: &mut egui::Ui) -> Regions {
         list(ui, &self.names, &mut self.hide, &mut self.looks);
         let invisible = Coat { opacity: 0.0, ..Coat::default() };

@@ -1,4 +1,4 @@
-//! A solver's device as the window's own: what lies on it is drawn there.
+//! The window uses the device of the solver, so that data on it are drawn there.
 
 use std::sync::Arc;
 

@@ -1,5 +1,5 @@
-//! The window of a finished run: its frames over a timeline. They are read on a thread of their own, the
-//! newest that is asked for; frames that cannot be read in time are left out.
+//! The window of a finished run: its frames over a timeline. A thread reads the frame that was asked for
+//! last. Frames that cannot be read in time are left out.
 
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -71,7 +71,7 @@ struct Loaded {
 /// Number of points and cells of a mesh. Frames of the same shape share their subject.
 type Shape = (usize, Vec<(CellKind, usize)>);
 
-/// Reads the newest frame that is asked for, as long as someone asks.
+/// Reads the newest requested frame, until the requests or the receiver end.
 fn read_frames(asked: &Receiver<Asked>, found: &Sender<Result<Loaded, String>>, wake: &dyn Fn()) {
     let mut shape: Option<Shape> = None;
     while let Ok(mut wanted) = asked.recv() {
@@ -87,7 +87,7 @@ fn read_frames(asked: &Receiver<Asked>, found: &Sender<Result<Loaded, String>>, 
     }
 }
 
-/// Finds the outermost points of all frames, each of which is read once.
+/// Finds the outermost points of all frames. Each frame is read once.
 fn survey(series: &Series, context: &egui::Context) -> Result<Receiver<Vec<Vector3>>, String> {
     let (send, receive) = channel();
     let (frames, context) = (series.frames.clone(), context.clone());

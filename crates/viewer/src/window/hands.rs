@@ -26,7 +26,7 @@ impl App {
         self.act_with(which, Hand::Take(point, self.stiffness));
     }
 
-    /// Takes what the other hand keeps where it is shown; whether it keeps something there.
+    /// Takes over the grip of the other hand if it is shown at a place. Returns true if there is one.
     pub(super) fn take_kept(&mut self, place: Pos2) -> bool {
         let kept = self.mouse.other();
         let there = self.frame.hand(kept).is_some_and(|[point, _]| self.is_at(&point, place));

@@ -178,7 +178,8 @@ fn toml_text(text: &str) -> String {
     format!("{text:?}")
 }
 
-/// The text of a scene with other numbers in their places; those that do not stand in the file.
+/// Returns the text of a scene with other numbers in their places, and the numbers that do not stand in the
+/// file.
 fn text_with(source: &Source, numbers: &[Number]) -> (String, Vec<String>) {
     let mut places = Vec::new();
     let mut elsewhere = Vec::new();

@@ -14,7 +14,7 @@ use crate::hand::{Hand, Point};
 const SPEED: f64 = 0.15;
 const TURNS: f64 = 60.0;
 const OPENS: f64 = 300.0;
-/// Seconds of a frame, at most.
+/// Largest duration of a frame [s].
 const LONGEST: f64 = 0.1;
 
 impl App {

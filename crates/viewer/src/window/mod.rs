@@ -159,7 +159,7 @@ struct App {
     names: RegionNames,
     /// True if every frame is copied to ordinary memory.
     in_memory: bool,
-    /// The device of the window, if it is one of a solver.
+    /// Device of the window, if it belongs to a solver.
     device: Option<Device>,
     stiffness: f64,
     speed: f64,
@@ -179,7 +179,7 @@ struct App {
     adapter: String,
     /// Actions that undo can take back, the newest last.
     acts: Vec<Act>,
-    /// A picture that was asked for.
+    /// Requested picture.
     taking: Taking,
     numbers: Numbers,
     samples: Samples,

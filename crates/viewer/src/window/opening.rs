@@ -1,4 +1,4 @@
-//! Opens another scene from a list: what lies in a folder, and the scenes that were opened last.
+//! A list from which another scene is opened: the files of a folder, and the scenes that were opened last.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -46,7 +46,7 @@ impl Browser {
         self.folder = folder;
     }
 
-    /// Draws it; what was chosen.
+    /// Draws the list, and returns the chosen file.
     fn ui(&mut self, ui: &mut egui::Ui) -> Option<PathBuf> {
         let (mut chosen, mut next) = (None, None);
         if !self.recent.is_empty() {

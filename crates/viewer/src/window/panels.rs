@@ -26,7 +26,7 @@ const TENSOR: [Option<Component>; 6] = {
 /// Width of a slider with its number and its text.
 pub(super) const SPEED: f32 = 240.0;
 
-/// Begins another line of buttons where this one has less room than what comes next is wide.
+/// Begins a new line of buttons if this one lacks room for this width.
 pub(super) fn make_room(ui: &mut egui::Ui, width: f32) {
     if ui.available_size_before_wrap().x < width {
         ui.end_row();
@@ -82,7 +82,7 @@ impl App {
         });
     }
 
-    /// Theme, size of the text, the panels that are shown, and what this program is.
+    /// Draws the theme, the size of the text, the choice of panels, and the description of this program.
     fn settings(&mut self, ui: &mut egui::Ui) {
         let context = ui.ctx().clone();
         let mut dark = ui.visuals().dark_mode;

@@ -1,5 +1,5 @@
-//! The numbers of laws, loads and bodies, changed while it is played. The scene with them is made on a thread
-//! of its own.
+//! The numbers of laws, loads and bodies, which can be changed while a scene is played. A thread makes the
+//! scene with the new numbers.
 
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
@@ -14,7 +14,7 @@ use super::{App, warnings};
 use crate::parameters::{Number, Parameter, parameters, with_numbers};
 use crate::session::Order;
 
-/// Some numbers, and where the world that is made of them comes from.
+/// Numbers, and the channel for the world with these numbers.
 type Making = (Vec<f64>, Receiver<Result<World, String>>);
 
 /// The numbers that can be changed.
@@ -83,7 +83,7 @@ fn dragged(ui: &mut egui::Ui, parameter: &mut Parameter) -> bool {
 }
 
 impl App {
-    /// The numbers that are others than in the file.
+    /// Returns the numbers that differ from the file.
     pub(super) fn changed_numbers(&self) -> Vec<Number> {
         self.numbers.changed(&self.numbers.values())
     }

@@ -259,7 +259,7 @@ impl App {
         }
     }
 
-    /// Time, pace and energies, and what a user should know.
+    /// Draws time, pace and energies, and notes for the user.
     fn draw_figures(&self, painter: &egui::Painter) {
         let frame = &self.frame;
         let paused = if frame.playing || frame.failure.is_some() { "" } else { ", paused: Space plays" };

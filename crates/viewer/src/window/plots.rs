@@ -1,4 +1,4 @@
-//! Curves over time, of what the user chooses.
+//! Plots of the chosen curves over time.
 
 use std::collections::BTreeSet;
 
@@ -78,7 +78,8 @@ fn draw(ui: &mut egui::Ui, unit: &str, mut lines: Vec<(String, Vec<[f64; 2]>)>) 
         .grid_spacing(12.0..=300.0);
     plot.allow_scroll(false).show(ui, |plot| {
         for (name, line) in lines {
-            // Bands fill what lies between curves that rise and drop within a pixel and their next point.
+            // Bands would fill the space between curves that rise and drop within a pixel and their next
+            // point.
             plot.line(Line::new(name, line).allow_band(false));
         }
     });

@@ -1,4 +1,4 @@
-//! Ctrl+Z: what a user did last is taken back, as far as the run can go back.
+//! Ctrl+Z: the user's last action is undone, if the run can go back so far.
 
 use super::App;
 use crate::hand::{Hand, Which};
@@ -41,8 +41,7 @@ impl App {
         });
     }
 
-    /// Takes back what was done last: numbers and pins as they were, a pull by going back to a state before
-    /// it.
+    /// Undoes the last action: numbers and pins are restored, a pull by going back to an earlier state.
     pub(super) fn undo(&mut self) {
         match self.acts.pop() {
             Some(Act::Numbers(before)) => self.set_numbers(&before),
@@ -59,7 +58,7 @@ impl App {
         }
     }
 
-    /// Goes back by one of the states that are kept.
+    /// Goes back by one kept state.
     pub(super) fn step_back(&mut self) {
         self.let_go();
         self.order(Order::Back(self.frame.steps.saturating_sub(1)));

@@ -27,7 +27,7 @@ const FIGURES: f32 = 104.0;
 /// Length of the axes on the screen, and how far their origin is from the corner.
 const AXES: f32 = 30.0;
 const CORNER: f32 = 46.0;
-/// Length of the bar on the screen, at most.
+/// Largest length of the bar on the screen.
 const BAR: f64 = 150.0;
 /// Distance of the bar's end from the left.
 pub(super) const BESIDE_BAR: f32 = 2.0 * CORNER + 24.0 + BAR as f32;
@@ -132,7 +132,7 @@ pub(super) struct Viewport {
     /// Points on the surface in increasing order, and the points of regions that show values.
     pub surface: Vec<u32>,
     showing: Vec<u32>,
-    /// The regions of which the latter are.
+    /// Regions for which these points were found.
     shown: Option<Regions>,
     /// Size of the body at rest [m], and the least and the greatest value that is seen.
     extent: f64,

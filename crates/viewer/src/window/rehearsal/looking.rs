@@ -13,7 +13,7 @@ use crate::window::keep::Taking;
 
 /// Pixels at which is picked.
 const PICKS: usize = 100;
-/// Least change of a channel of the colour of what one sees through.
+/// Least change of a colour channel of a transparent body.
 const CHANGE: u8 = 20;
 
 /// The mouse over a pixel on the body finds the triangle that lies there; beside the body it finds nothing.

@@ -115,7 +115,7 @@ impl Rehearsal {
     fn painted(scene: &str) -> Option<Self> {
         let mut window = Self::paused(scene)?;
         window.painted = true;
-        // What came before was not drawn.
+        // Earlier changes were not drawn.
         let port = &mut window.app_mut().port;
         let (points, values) = (port.points.clone(), port.values.clone());
         port.set(&points, &values);
@@ -233,7 +233,7 @@ impl Rehearsal {
         self.release(text, |_| true);
     }
 
-    /// Closes the window; what it recorded.
+    /// Closes the window, and returns its recording.
     fn close(self) -> Recording {
         let Self { harness, folder, .. } = self;
         let mut app = harness.into_state().unwrap();

@@ -66,7 +66,7 @@ impl Screen {
         Textures(self.state.clone())
     }
 
-    /// Draws a frame, and gives the picture to whom asked for it.
+    /// Draws a frame, and passes the picture to the code that asked for it.
     pub fn paint(&mut self, context: &egui::Context, output: &FullOutput) {
         let pixels_per_point = context.pixels_per_point();
         let screen = ScreenDescriptor { size_in_pixels: self.size, pixels_per_point };
@@ -108,7 +108,7 @@ impl Screen {
     }
 }
 
-/// Who asked for a picture in this frame.
+/// Returns the requests for a picture in this frame.
 fn asked(output: &FullOutput) -> Vec<ScreenshotCallback> {
     let commands = output.viewport_output.values().flat_map(|viewport| &viewport.commands);
     commands
