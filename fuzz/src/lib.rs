@@ -1,6 +1,6 @@
 //! The doors of Pliant: readers of untrusted bytes. Each takes any bytes and ends in a result or an error,
-//! never in a panic. It takes no memory beyond the content of the bytes. A door with a checksum gets bytes
-//! with a valid one, because no change would pass the check otherwise.
+//! never in a panic. It allocates no more memory than the bytes fill. A door with a checksum gets bytes with
+//! a valid one, because no change would pass the check otherwise.
 //!
 //! [`seeds`] returns small inputs of each door. Every test run tries them with random changes; `.ci/nightly`
 //! has AFL++ look for others.

@@ -1,5 +1,5 @@
 //! The contact around a tool, as the simulation last found it: tangent planes and a compliance. A tool at p
-//! that feels the force f has the unloaded place u = p + W f. There it would be if the tissue had not given
+//! that feels the force f has the unloaded place u = p + W f. It would be there if the tissue had not given
 //! way. With the simulation's unloaded place a = p₀ + W f₀, plane i asks
 //!
 //! ```text
@@ -7,8 +7,8 @@
 //! ```
 //!
 //! so that the model gives the simulation's own force f₀ at its own place p₀, whatever W. W only sets the
-//! change of the force around this place. Source: the local models of Adachi, Kumano and Ogino (1995),
-//! "Intermediate representation for stiff virtual objects". Mark et al. (1996), "Adding force feedback to
+//! change of the force around this place. Sources of the local models: Adachi, Kumano and Ogino (1995),
+//! "Intermediate representation for stiff virtual objects"; Mark et al. (1996), "Adding force feedback to
 //! graphics systems". The compliance is by Duriez, Dubois, Kheddar and Andriot (2006). Leaves out: moments,
 //! curvature of the tool, inertia and viscosity of the tissue between two models.
 //!

@@ -254,7 +254,8 @@ impl Subject {
         self.outer
     }
 
-    /// True if a triangle is drawn from its front, or from its back. Things are drawn from one side only.
+    /// True if a triangle is drawn when it is seen from its front, or from its back. Things are drawn from
+    /// one side only.
     pub fn is_drawn(&self, triangle: usize, from_front: bool) -> bool {
         let mark = self.triangles[triangle][3] & (STEEL | HOLLOW);
         mark == 0 || (mark == STEEL) == from_front
