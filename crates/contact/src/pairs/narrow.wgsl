@@ -1,9 +1,9 @@
-// Where points lie by triangles, and where edges cross; twin of narrow.rs and of `Pairs::find`. The module
-// around it gives `between(a, b)`, the way [m] from node b to node a before the step; `ring_of(k)`, the other
-// corners, in order, of a triangle around a node, for every second k; `corners_of(row)`, the triangle of a
-// candidate; `at_border(row, corners)`, whether those of its corners that are told are all at borders;
-// `take_pair(row, nodes, weights, normal, distance)`, which notes a pair that is found in the place of its
-// candidate, and `leave_pair(row)`, which notes that there is none; and exact.wgsl.
+// Places of points relative to triangles, and crossings of edges; twin of narrow.rs and of `Pairs::find`. The
+// module around it gives: `between(a, b)`, the way [m] from node b to node a before the step; `ring_of(k)`,
+// the other corners, in order, of a triangle around a node, for every second k; `corners_of(row)`, the
+// triangle of a candidate; `at_border(row, corners)`, true if all the given corners of the triangle are at
+// borders; `take_pair(row, nodes, weights, normal, distance)`, which notes a pair in the place of its
+// candidate; `leave_pair(row)`, which notes that there is no pair; and exact.wgsl.
 //
 // Places are ways from one of the nodes, so that single precision keeps the digits of gaps.
 
@@ -20,7 +20,8 @@ struct Above {
     normal: vec3f,
     // Height over the plane [m].
     height: f32,
-    // Weights of the point beneath, or of the closest point of the triangle if that is far beside it.
+    // Weights of the point beneath, or of the closest point of the triangle if the point is far beside the
+    // triangle.
     weights: vec3f,
     // The way from there [m].
     way: vec3f,
@@ -85,8 +86,9 @@ fn node_outward(node: u32, first: u32, end: u32) -> vec3f {
     return unit(area);
 }
 
-// Finds what a node touches among the triangles of its candidates, from one row to another: `ring` tells
-// those around it; no farther than `within` [m]. `reach` and `depth` [m] are those of the lists.
+// Finds the contacts of a node among the triangles of its candidates, from one row to another. `ring` is the
+// range of the triangles around the node. No contact is farther than `within` [m]. `reach` and `depth` [m]
+// are the values of the lists.
 fn find_above(node: u32, ring: vec2u, first: u32, end: u32, within: f32, reach: f32, depth: f32) {
     var outward = vec3f(0.0);
     var is_oriented = false;
@@ -152,7 +154,7 @@ fn find_above(node: u32, ring: vec2u, first: u32, end: u32, within: f32, reach: 
         }
     }
     if faces && nearest < min(over, hidden) * (1.0 - SAME) - ROUNDING * reach {
-        // In one plane with a triangle, beside it, is not beneath it.
+        // A node in the plane of a triangle, but outside the triangle, is not beneath it.
         let least = (SAME * nearest + ROUNDING * reach) * norm(nearest_normals);
         let is_behind = dot(nearest_way, nearest_normals) < -least;
         // Who is behind a border is beside the surface.
@@ -228,15 +230,16 @@ fn find_crossing(row: u32, nodes: vec4u, across: vec4u) {
         }
     }
     let distance = dot(normal, apart);
-    // Edges that overlap by more than one of them goes on beyond the other leave each other past its end.
+    // Two edges can overlap by more than one edge continues beyond the other. Then they separate past its
+    // end.
     let ends = min(weights, vec2f(1.0) - weights) * vec2f(root(squares.x), root(squares.y));
     if distance > -min(ends.x, ends.y) {
         take_pair(row, nodes, vec4f(1.0 - weights.x, weights.x, weights.y - 1.0, -weights.y), normal, distance);
     }
 }
 
-// The sum of the outward normals of the triangles of an edge, from the ways from its first end to its other
-// one and to the nodes across.
+// Returns the sum of the outward normals of the triangles of an edge. The arguments are the ways from its
+// first end to its other end and to the opposite nodes.
 fn edge_outward(along: vec3f, left: vec3f, right: vec3f, is_border: bool) -> vec3f {
     return unit(cross(along, left)) + select(unit(cross(along, -right)), vec3f(0.0), is_border);
 }
