@@ -63,7 +63,7 @@ fn weights_within(corners: array<vec3f, 3>, end: f32) -> vec3f {
 }
 
 // Returns the place on an edge, from 0 to 1, that is nearest to the segment. The first of three lies along
-// the segment, the others are nearest to its ends. Zero if there is none.
+// the segment, the others are nearest to its ends. Zero if there is no such place.
 fn part_of_edge(edge: vec3f, along: vec3f, half: f32, which: u32) -> f32 {
     let squared = dot(along, along);
     let across = dot(along.xy, along.xy);

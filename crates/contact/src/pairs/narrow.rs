@@ -130,8 +130,8 @@ impl Across {
             return None;
         }
         let distance = normal.dot(&between);
-        // Two edges can overlap by more than one edge continues beyond the other. Then they separate past its
-        // end.
+        // An overlap may exceed the length by which one edge continues past the crossing. The edges then
+        // separate past its end.
         let [s, t] = weights;
         let beyond = (s.min(1.0 - s) * aa.sqrt()).min(t.min(1.0 - t) * bb.sqrt());
         (distance > -beyond).then_some(Self { weights, normal, distance })

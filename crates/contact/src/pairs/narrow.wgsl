@@ -230,8 +230,8 @@ fn find_crossing(row: u32, nodes: vec4u, across: vec4u) {
         }
     }
     let distance = dot(normal, apart);
-    // Two edges can overlap by more than one edge continues beyond the other. Then they separate past its
-    // end.
+    // An overlap may exceed the length by which one edge continues past the crossing. The edges then separate
+    // past its end.
     let ends = min(weights, vec2f(1.0) - weights) * vec2f(root(squares.x), root(squares.y));
     if distance > -min(ends.x, ends.y) {
         take_pair(row, nodes, vec4f(1.0 - weights.x, weights.x, weights.y - 1.0, -weights.y), normal, distance);

@@ -36,7 +36,7 @@ fn sheets_that_face_each_other_are_seen_with_their_distance() {
             [true, false].map(|of| all.iter().filter(|p| (p.weights[0] == 1.0) == of).count());
         assert!(points >= 18 && edges >= 10, "{points} {edges}");
         for pair in all {
-            // Nodes outside a border are as far from it as they are to its side.
+            // The pair of a node outside a border has its distance from the border.
             if pair.normal.z.abs() < 0.9 {
                 assert!(pair.distance > 0.19, "{pair:?}");
                 continue;
