@@ -18,7 +18,7 @@ pub type MappedPoint = ([f64; 3], Vec<(u32, f64)>);
 pub struct OnDevice<'a> {
     pub(crate) stepper: &'a mut GpuStepper,
     pub(crate) state: &'a mut State<f32>,
-    /// Whether forces belong to the simulation's instant.
+    /// True if forces belong to the simulation's instant.
     pub(crate) evaluated: &'a mut bool,
 }
 

@@ -29,7 +29,7 @@ pub(crate) trait Numeric: Scalar {
     /// A state with its memory, kept.
     fn into_snapshot(state: State<Self>, memory: Memory<Self>) -> Snapshot;
 
-    /// The same, from what is kept; `None` of another number type.
+    /// Reads a state and its memory from a snapshot; `None` for another number type.
     fn of_snapshot(snapshot: &Snapshot) -> Option<(&State<Self>, &Memory<Self>)>;
 
     /// Vectors of nodes as they are shown.
@@ -133,7 +133,7 @@ impl<R: Numeric> Solids<R> {
         Ok(Self { model: Arc::clone(&part.model), step: part.steps.step, state, solver })
     }
 
-    /// Where the nodes are.
+    /// Places of the nodes.
     fn nodes(&self) -> Displaced<'_, R> {
         Displaced { rest: &self.model.rest, displacement: &self.state.displacement, velocity: &[] }
     }

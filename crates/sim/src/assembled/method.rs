@@ -72,7 +72,7 @@ impl SolverMethod {
         self.equations().map_or(&[], |solver| solver.attempts())
     }
 
-    /// How far moved nodes whose force is limited are behind their motion.
+    /// Returns the lags of moved nodes, with limited force, behind their motion.
     pub(super) fn lags(&self) -> &[Lag] {
         self.equations().map_or(&[], |solver| solver.lags())
     }

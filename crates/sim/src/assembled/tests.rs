@@ -55,7 +55,7 @@ fn explicit_shells_find_their_forces_once_a_step() {
 #[test]
 fn a_facet_at_the_edge_of_folding_over_goes_on_or_fails_on_a_device_as_on_the_processor() {
     let Some(device) = pliant_testing::found_or_skipped(Device::open(None)) else { return };
-    // The state after so many steps, and whether the first one was not the device's.
+    // The state after a number of steps, and whether the CPU took the first one.
     let run = |device: Option<&Device>, angle: f64, turn: f64| {
         let mut shells = strip(ShortSteps { device: device.cloned() }, 0.05);
         for node in 2..4 {
