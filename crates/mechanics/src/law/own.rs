@@ -62,7 +62,7 @@ pub trait OwnLaw: fmt::Debug + Send + Sync + 'static {
         0
     }
 
-    /// Whether the volumetric stress is J U′(J) C⁻¹; elements that average pressures refuse other laws.
+    /// True if the volumetric stress is J U′(J) C⁻¹; elements that average pressures refuse other laws.
     fn has_volumetric_energy(&self) -> bool {
         false
     }

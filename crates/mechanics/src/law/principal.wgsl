@@ -9,12 +9,12 @@ struct Principal {
     directions: mat3x3f,
 }
 
-// Far below any strain, and so far above the root of the smallest number that no square of an entry like it
-// is lost: keeps 0/0 from happening where a tensor is diagonal already.
+// Far below any strain. Also far above the root of the smallest number, so that no square of an entry of this
+// size is lost. Avoids 0/0 where a tensor is diagonal already.
 const TINY: f32 = 1e-18;
 
-// Turns the first two axes until the entry between them is zero, then names the axes (2, 3, 1), so that each
-// pair has its turn.
+// Turns the first two axes until the entry between them is zero. Then renames the axes (2, 3, 1), so that
+// each pair has its turn.
 fn turned(t: Principal) -> Principal {
     let between = t.beside.z;
     let difference = t.values.y - t.values.x;

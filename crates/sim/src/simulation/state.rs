@@ -82,7 +82,7 @@ impl State {
     /// Checks that the state belongs to a world.
     ///
     /// # Errors
-    /// If not.
+    /// If it does not.
     pub(super) fn check(&self, world: &World) -> Result<(), Failure> {
         let Self(parts, between) = self;
         let is_own = parts.len() == world.parts.len()
