@@ -16,7 +16,7 @@ use serde::de::{Deserialize, Deserializer, Error};
 
 /// A number that counts.
 pub trait Count: Copy {
-    /// True if a run can continue counting from here: the first bit is 0.
+    /// True if a run can continue counting from here: the highest bits are 0.
     fn can_go_on(self) -> bool;
 }
 
