@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use crate::near::{Near, Triangles};
 
 /// Signed distances [m] at the points of a regular grid, linear in between along each axis. Beyond the grid
-/// the distance is that to the point of the surface that is nearest to the rim of the grid.
+/// the distance is measured to the point of the surface that is nearest to the rim of the grid.
 #[derive(Clone)]
 pub struct Grid {
     origin: Vector3<f64>,

@@ -33,7 +33,7 @@ const FELT: f64 = 0.01;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Lag {
     number: u32,
-    /// From its place on the trajectory to where it is [m], now and after the step.
+    /// Way [m] from its place on the trajectory to its real place, before and after the step.
     ways: [[f64; 3]; 2],
     /// The force [N] with which it pushes: on average until the step before, and in this one.
     forces: [[f64; 3]; 2],
@@ -55,7 +55,7 @@ impl Lag {
         self.number as usize
     }
 
-    /// From its place on the trajectory to where it is [m].
+    /// Returns the way [m] from its place on the trajectory to its real place.
     pub fn now(&self) -> Vector3<f64> {
         self.ways[0].into()
     }

@@ -72,7 +72,7 @@ impl Surface {
     }
 }
 
-/// A point of one surface beside a point of another.
+/// A near pair: a point of one surface and a point of another.
 #[derive(Clone, Copy, Debug)]
 pub struct Pair {
     /// Nodes that take part: a node and the corners of a triangle, or the ends of two edges.
@@ -93,7 +93,7 @@ pub struct Pair {
 pub struct Point<'p> {
     /// The node.
     pub node: u32,
-    /// The triangles of its own surface around it: each by its other corners, in order.
+    /// The triangles of its surface around the node: each by its other corners, in order.
     pub ring: &'p [[u32; 2]],
     /// True if the node belongs to the first of two surfaces.
     pub in_order: bool,
@@ -586,7 +586,7 @@ impl Pairs {
 struct Seen<'r> {
     /// Pair with the nearest triangle above the node: a node inside leaves by the shortest way.
     beneath: Option<Pair>,
-    /// The least distance [m] from those that it lies above, or on.
+    /// The least distance [m] from the triangles that it lies above, or on.
     above: f64,
     /// The overlap [m] up to which it lies on a triangle.
     on: f64,
@@ -649,7 +649,7 @@ impl Nearest {
         let Self { distance, way, normals, .. } = self;
         // A node in the plane of a triangle, but outside the triangle, is not beneath it.
         let sign = if way.dot(normals) < -SAME * distance * normals.norm() { -1.0 } else { 1.0 };
-        // Who is behind a border is beside the surface.
+        // A node behind a border is beside the surface.
         let nodes = surface.faces[self.face as usize];
         let mut at = nodes.iter().zip(&self.weights).filter(|(_, weight)| **weight != 0.0);
         let beside = sign < 0.0 && at.all(|(node, _)| surface.border.binary_search(node).is_ok());

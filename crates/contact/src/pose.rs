@@ -62,7 +62,8 @@ impl Trajectory {
         Self { start, motion, growth: None, limit: None }
     }
 
-    /// With a surface that moves outward by a distance [m] as a curve goes from 0 to 1.
+    /// Returns the trajectory with a surface that moves outward by a distance [m] as a curve goes from 0
+    /// to 1.
     pub fn growing(self, by: f64, curve: Curve) -> Self {
         Self { growth: Some((by, curve)), ..self }
     }
@@ -77,8 +78,8 @@ impl Trajectory {
         self.growth.is_some()
     }
 
-    /// With a force [N] that the thing pushes with at most: it lags behind its trajectory where it would need
-    /// more.
+    /// Returns the trajectory with the largest force [N] that the thing pushes with. Where the thing would
+    /// need more, it lags behind its trajectory.
     pub fn limited(self, force: f64) -> Self {
         Self { limit: Some(force), ..self }
     }
@@ -175,13 +176,13 @@ impl<T> Way<T> {
 }
 
 impl Leg {
-    /// From a pose to another between two times [s].
+    /// Makes a leg from one pose to another between two times [s].
     pub fn to_pose(times: [f64; 2], poses: [Pose; 2]) -> Self {
         let plain = |pose: Pose| (pose.translation.vector.into(), pose.rotation.coords.into());
         Self { pose: Some(Way { times, ends: poses.map(plain) }), opening: None }
     }
 
-    /// From an angle [rad] between jaws to another between two times [s].
+    /// Makes a leg from one angle [rad] between jaws to another between two times [s].
     pub fn to_opening(times: [f64; 2], angles: [f64; 2]) -> Self {
         Self { pose: None, opening: Some(Way { times, ends: angles }) }
     }

@@ -37,7 +37,7 @@ pub enum ProfileError {
 /// A piece of the outline.
 #[derive(Clone, Copy, Debug)]
 enum Piece {
-    /// From a point along a unit direction over a length [m], with the direction to its outside.
+    /// A line from a point along a unit direction over a length [m], with the direction to its outside.
     Line { from: Vector2<f64>, along: Vector2<f64>, length: f64, out: Vector2<f64> },
     /// Around a centre, with the unit direction to its middle and the cosine of half of its angle. The sign
     /// is 1 for a convex arc and −1 for a concave one.

@@ -80,8 +80,8 @@ pub fn pairs_shader() -> String {
     [&constants(&numbers), include_str!("pairs/narrow.wgsl")].join("\n")
 }
 
-/// Points of faces at balls and capsules, in WGSL, beside [`shader`]: `takes_nearest` of a thing, and
-/// `nearest_point` of a face.
+/// Returns the functions for points of faces at balls and capsules, in WGSL, to go with [`shader`]:
+/// `takes_nearest` of a thing, and `nearest_point` of a face.
 pub fn face_points_shader() -> String {
     [&constants(&[("ALONG", ALONG)]), include_str!("face_points.wgsl")].join("\n")
 }

@@ -1,4 +1,4 @@
-//! Rigid shapes, each in a frame of its own, with their signed distance.
+//! Rigid shapes, each in its frame, with their signed distance.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -185,8 +185,8 @@ impl Shape {
     }
 }
 
-/// Largest distance that a drawn corner moves where the surface grows by 1: the tip of a sharp cone has no
-/// bound of its own.
+/// Largest distance that a drawn corner moves where the surface grows by 1. Without this limit the tip of a
+/// sharp cone could move any distance.
 const FARTHEST: f64 = 3.0;
 
 impl Shape {
@@ -249,7 +249,8 @@ fn around(from: Vector3<f64>, radius: f64) -> Near {
     Near { distance: distance - radius, normal }
 }
 
-/// In the half-plane of the distance from the axis and the height, a rectangle of this width and half height.
+/// Distance from a cylinder: from a rectangle of this width and half height, in the half-plane of the
+/// distance from the axis and the height.
 fn cylinder(point: &Vector3<f64>, radius: f64, half: f64) -> Near {
     let from_axis = Vector2::new(point.x, point.y);
     let q = from_axis.norm();
@@ -280,8 +281,8 @@ fn cuboid(point: &Vector3<f64>, half: &Vector3<f64>) -> Near {
     Near { distance: beyond[axis], normal }
 }
 
-/// In the half-plane of the distance from the axis and the height, the nearest point of the base or of the
-/// slope.
+/// Distance from a cone: from the nearest point of the base or of the slope, in the half-plane of the
+/// distance from the axis and the height.
 fn cone(point: &Vector3<f64>, radius: f64, height: f64) -> Near {
     let from_axis = Vector2::new(point.x, point.y);
     let q = Vector2::new(from_axis.norm(), point.z);

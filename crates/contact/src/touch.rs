@@ -273,7 +273,7 @@ pub struct Passage {
 }
 
 impl Passage {
-    /// In the step from one stance to another.
+    /// Makes the passage in the step from one stance to another.
     pub fn new(rigid: &Rigid, stances: [Stance; 2]) -> Self {
         let (poses, growth) = (stances.map(|own| own.pose), stances.map(|own| own.growth));
         let [before, after] = poses;
@@ -384,7 +384,7 @@ impl Passage {
     }
 }
 
-/// Who touches whom.
+/// A contact of a surface with its partner.
 #[derive(Clone, Debug)]
 pub struct Contact {
     /// Its name.
@@ -467,7 +467,7 @@ pub enum With {
 pub struct Contacts {
     /// Obstacles and tools.
     pub rigids: Vec<Rigid>,
-    /// Who touches whom.
+    /// Contacts of surfaces with their partners.
     pub contacts: Vec<Contact>,
     /// Rest places [m] of nodes that another solver moves: in surfaces they are numbered after the nodes of
     /// the model.

@@ -134,7 +134,7 @@ pub struct Weights {
 }
 
 impl Weights {
-    /// From one row of (node, weight) per carried point.
+    /// Makes the weights from one row of (node, weight) per carried point.
     pub fn from_rows<'a>(rows: impl IntoIterator<Item = &'a [(u32, f64)]>) -> Self {
         let mut mapping = Self { offsets: vec![0], ..Self::default() };
         for row in rows {

@@ -100,7 +100,7 @@ pub enum PronyError {
         /// Its relaxation time [s].
         time: f64,
     },
-    /// Nothing of the stress would be left after relaxing.
+    /// No stress would be left after relaxing.
     #[error(
         "the {part:?} weights sum to {sum}; they must sum to less than 1, or nothing is left to hold the tissue"
     )]

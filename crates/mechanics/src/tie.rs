@@ -43,7 +43,7 @@ impl Tie {
 /// Reasons why nodes cannot follow others.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TieError {
-    /// It follows others by another tie.
+    /// The node follows others by another tie.
     #[error("node {node} of `{body}` is tied already, by `{other}`")]
     Twice {
         /// The node, numbered in its body.

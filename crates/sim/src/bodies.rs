@@ -1,4 +1,4 @@
-//! Shells, and solids whose equations are solved, beside the model of all solvers.
+//! Shells, and solids whose equations are solved, in addition to the model of all solvers.
 
 use std::ops::Range;
 use std::sync::Arc;

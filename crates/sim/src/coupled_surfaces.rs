@@ -377,7 +377,7 @@ impl CoupledSurface {
     }
 }
 
-/// Surfaces of a host's contacts that have nodes of a set, and those that touch these.
+/// Contacts of a host whose surfaces have nodes of a set.
 fn surfaces<'a>(host: &'a Part, coupled_nodes: &Range<u32>) -> impl Iterator<Item = &'a Contact> {
     let coupled_nodes = coupled_nodes.clone();
     let all = host.method.contacts().into_iter().flat_map(|contacts| &contacts.contacts);

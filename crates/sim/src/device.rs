@@ -23,7 +23,8 @@ pub struct OnDevice<'a> {
 }
 
 impl OnDevice<'_> {
-    /// Goes up to `steps` steps on without reading anything back, as many as take about `within`. How many.
+    /// Takes up to `steps` steps without reading anything back, as many as take about `within`. Returns their
+    /// number.
     ///
     /// # Errors
     /// If the device fails; a step that fails is reported at the next evaluation.

@@ -87,7 +87,7 @@ pub struct LongSteps {
 }
 
 impl From<DynamicSettings> for LongSteps {
-    /// On the CPU.
+    /// Makes long steps on the CPU.
     fn from(settings: DynamicSettings) -> Self {
         Self {
             settings,
@@ -126,7 +126,7 @@ impl Explicit {
 }
 
 impl Method {
-    /// Shells, and solids whose equations are solved, with all they need beside the model.
+    /// Shells, and solids whose equations are solved, with all data that they need in addition to the model.
     pub fn bodies(&self) -> Option<&Arc<ImplicitBodies>> {
         match self {
             Self::ExplicitShells(bodies, _) | Self::Static(bodies, _) | Self::Implicit(bodies, _) => {
@@ -175,7 +175,7 @@ const IMPLICIT_CELL: u64 = 3000;
 const IMPLICIT_SHELL: u64 = 7000;
 
 impl Part {
-    /// Bytes that its solver takes at least, beside the model.
+    /// Least memory in bytes of its solver, in addition to the model.
     fn bytes(&self) -> u64 {
         let cells = self.model.cell_count() as u64;
         match &self.method {

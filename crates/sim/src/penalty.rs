@@ -23,7 +23,7 @@ use crate::failure::Failure;
 use crate::part::{Method, Part};
 use crate::participant::Participant;
 
-/// a/b: the stiffness k is that many times c/H.
+/// Ratio a/b: the stiffness k is this ratio times c/H.
 const SPRING: f64 = 1.0;
 /// The part of the limit of stability that ties and vibrations of a body take together.
 const ALL: f64 = 0.96;

@@ -18,7 +18,7 @@ impl Schedule {
         Self { every, seen: 0, last: f64::NEG_INFINITY }
     }
 
-    /// One that has seen all up to an instant, that included.
+    /// Makes a schedule whose observer has seen all instants up to and including this one.
     pub fn after(every: f64, time: f64, step: f64) -> Self {
         let mut schedule = Self::new(every);
         schedule.is_due(time, step, true);

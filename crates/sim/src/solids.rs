@@ -118,7 +118,7 @@ pub(crate) struct Solids<R> {
 }
 
 impl<R: Numeric> Solids<R> {
-    /// From a state on.
+    /// Makes the participant from a state.
     ///
     /// # Errors
     /// If the stepper can't be made.
@@ -138,8 +138,8 @@ impl<R: Numeric> Solids<R> {
         Displaced { rest: &self.model.rest, displacement: &self.state.displacement, velocity: &[] }
     }
 
-    /// Takes up what a restart needs beside the state; of a run with other steps how these were counted, and
-    /// their length [s].
+    /// Takes up the memory of a restart. After a run with other steps, `steps` has their clock and their
+    /// length [s].
     pub(crate) fn resume(&mut self, memory: Memory<R>, steps: Option<(Clock, f64)>) {
         if let Some((clock, step)) = steps {
             self.solver.go_on(&clock, step, &self.state);

@@ -34,7 +34,7 @@ pub struct LoadStepProgress {
 /// Data that a solver needs besides the state to continue.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) enum Memory<R> {
-    /// Nothing.
+    /// No memory.
     #[default]
     Nothing,
     /// The equilibrium last found.
@@ -58,8 +58,8 @@ impl<R> Memory<R> {
 pub struct Equilibria {
     /// Equilibria found, including the start and parts of load steps.
     pub found: u64,
-    /// Estimated error of the external work [J], a sum of trapezia between them; `None` where a first one
-    /// says nothing of its own.
+    /// Estimated error of the external work [J], which is a sum of trapezia between equilibria. `None` where
+    /// a first equilibrium alone gives no estimate.
     pub external_error: Option<f64>,
     /// Estimated error of the displacements over the largest one, at worst.
     pub displacement_error: f64,

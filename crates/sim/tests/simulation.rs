@@ -337,7 +337,7 @@ fn pushed_nodes_are_borne_in_equilibrium() {
     }
 }
 
-/// Nothing takes the work of forces on explicit shells but motion and strain.
+/// Only motion and strain take the work of forces on explicit shells.
 #[test]
 fn forces_on_explicit_shells_do_work() {
     let part = parts(1e5).into_iter().find(|part| matches!(part.method, Method::ExplicitShells(..))).unwrap();

@@ -1,4 +1,4 @@
-//! Ties between participants that take steps of their own.
+//! Ties between participants with different steps.
 
 use nalgebra::Vector3;
 use pliant_implicit::Shell;
@@ -59,7 +59,7 @@ fn glued(lower: Model, upper: Model, duration: f64, finer: u64) -> World {
     World { ties, ..World::new(vec![part("lower", lower), part("upper", upper)]) }
 }
 
-/// Momentum [kg m/s] along the columns, with that which the slower one is still to feel.
+/// Momentum [kg m/s] along the columns, with the momentum that the slower one is still to feel.
 fn momentum(simulation: &mut Simulation) -> f64 {
     let frame = simulation.frame().unwrap();
     let of = |(part, now): (&Part, &dyn pliant_sim::Instant)| -> f64 {

@@ -9,12 +9,13 @@ use super::collision_mesh::{CollisionMesh, around};
 
 /// Wide skin of a node, over the skin of a list.
 const WIDER: f64 = 2.5;
-/// By how much it is wider at most, and its least, over the distance of the barrier.
+/// Largest difference between the wide skin and the skin of a list, and least wide skin, over the distance of
+/// the barrier.
 const MORE: f64 = 10.0;
 const LEAST: f64 = 4.0;
-/// The part of the wide skin of before that it is at least.
+/// Least wide skin, over the previous wide skin.
 const KEPT: f64 = 0.5;
-/// The most that round-off takes of a distance, over it; and a number of single precision.
+/// Largest round-off of a distance, over the distance; in double and in single precision.
 pub(super) const ROUND_OFF: f64 = 1e-9;
 const SINGLE: f64 = 2e-7;
 /// Pairs that are compared at once.
@@ -129,7 +130,7 @@ pub(super) struct BroadPhase {
     /// Skins [m] of all nodes, and their places [m] when pairs were found; no places before the first search.
     skin: Vec<f64>,
     place: Vec<Vector3<f64>>,
-    /// The distance [m] within which they were found, beside skins.
+    /// The distance [m], besides skins, within which pairs were found.
     within: f64,
     /// Number, from 1 on, of the point or edge for which each face or edge was last left out.
     left_out: Vec<u32>,

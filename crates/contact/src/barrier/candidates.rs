@@ -132,7 +132,7 @@ pub(super) struct Group {
     /// of edges, that coincide at rest.
     rest: Vec<Vector3<f64>>,
     apart: [Apart; 2],
-    /// In bins by their distance, in the order of their numbers within one.
+    /// Candidates in bins by their distance; within a bin in the order of their numbers.
     candidates: Vec<Candidate>,
     /// Begin of the candidates of each bin, and memory to sort them in.
     bins: Vec<u32>,

@@ -96,7 +96,7 @@ pub(super) const ADVANCES: usize = 10_000;
 pub struct Query {
     /// The distance ξ [m] below which the primitives are in each other.
     pub offset: f64,
-    /// By how much [m] that distance grows over the motion.
+    /// Growth [m] of the distance ξ over the motion.
     pub rise: f64,
     /// Part of the gap at the start that is to be kept.
     pub keep: f64,

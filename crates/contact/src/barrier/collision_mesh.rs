@@ -114,7 +114,7 @@ impl CollisionMesh {
     }
 }
 
-/// The box around nodes, each with a margin of its own [m].
+/// The box around nodes, each with its margin [m].
 pub(super) fn around<const N: usize>(
     nodes: [u32; N],
     place: &impl Fn(u32) -> Vector3<f64>,

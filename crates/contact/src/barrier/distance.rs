@@ -115,7 +115,8 @@ pub(crate) fn edge_edge(points: &[Vector3<f64>; 4]) -> Nearest {
     Nearest::new(points, coefficients, region)
 }
 
-/// The distance [m] of two edges alone, in a third of the time of [`edge_edge`]; but for round-off the same.
+/// The distance [m] of two edges alone, equal to the distance of [`edge_edge`] up to round-off, in a third of
+/// the time.
 pub(super) fn edge_distance(points: &[Vector3<f64>; 4]) -> f64 {
     let [a, b, c, d] = points;
     let (along, other, between) = (b - a, d - c, a - c);
@@ -378,7 +379,7 @@ mod tests {
         gradients_by_differences(1_000_000);
     }
 
-    /// Nothing in the primitives is nearer: by a search over their points.
+    /// A search over the points of the primitives finds nothing nearer.
     #[test]
     fn distances_are_the_least_over_all_points() {
         let mut random = Random::new(8);

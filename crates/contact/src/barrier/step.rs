@@ -296,7 +296,7 @@ impl BarrierStep {
         self.barriers.nodes
     }
 
-    /// Who touches whom.
+    /// The contacts with their surfaces and rigid things.
     pub fn contacts(&self) -> &Contacts {
         &self.barriers.contacts
     }
@@ -312,8 +312,8 @@ impl BarrierStep {
         &self.barriers.legs
     }
 
-    /// Rigid things beside their trajectories, by their number, at the start and the end of a step [m]; from
-    /// the next step on.
+    /// Shifts [m] of rigid things off their trajectories, by their number, at the start and the end of a
+    /// step. Changes act from the next step on.
     pub fn shifts_mut(&mut self) -> &mut Vec<(u32, [Vector3<f64>; 2])> {
         &mut self.barriers.shifts
     }

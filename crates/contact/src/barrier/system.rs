@@ -57,7 +57,7 @@ pub struct Barriers {
     pub(super) wall_distances: Vec<Vec<f64>>,
     /// Ways of rigid things that are driven from outside, by their number.
     pub(super) legs: BTreeMap<u32, Leg>,
-    /// Rigid things beside their trajectories, by their number: how far [m] at the start and the end of the
+    /// Shifts [m] of rigid things off their trajectories, by their number, at the start and the end of the
     /// step.
     pub(super) shifts: Vec<(u32, [Vector3<f64>; 2])>,
 }

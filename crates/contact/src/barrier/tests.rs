@@ -335,8 +335,8 @@ fn a_turning_thing_goes_through_nothing() {
     assert!(time_fraction > 0.1 && time_fraction < 0.5, "{time_fraction}");
 }
 
-/// A search for a fraction elsewhere changes nothing of what was evaluated: neither stiffness nor friction
-/// that lags, nor pairs that are near.
+/// A search for a fraction elsewhere leaves the evaluated state unchanged: stiffness, lagged friction and
+/// near pairs.
 #[test]
 fn a_search_leaves_what_was_evaluated() {
     for thing in things().into_iter().chain(growing(0.002)) {

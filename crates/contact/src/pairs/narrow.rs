@@ -52,7 +52,8 @@ pub(super) struct Above {
 }
 
 impl Above {
-    /// With points that are so far beside the triangle, over its height, as inner ones.
+    /// Finds the place of a point relative to a triangle. Points beside the triangle by up to `beside` of its
+    /// height count as inner ones.
     #[inline]
     pub fn of(corners: &[Vector3<f64>; 3], point: &Vector3<f64>, beside: f64) -> Self {
         let [a, b, c] = corners;
@@ -97,7 +98,7 @@ pub(super) struct Across {
 }
 
 impl Across {
-    /// If they are no farther than a distance [m].
+    /// Finds the crossing of two edges, if they are no farther apart than a distance [m].
     pub fn of(
         [first, second]: [&Edge; 2],
         within: f64,

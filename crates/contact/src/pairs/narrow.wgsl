@@ -56,7 +56,8 @@ fn closest_of_border(a: vec3f, b: vec3f, c: vec3f) -> vec3f {
     return vec3f(along.z, 0.0, 1.0 - along.z);
 }
 
-// With points that are so far beside the triangle, over its height, as inner ones.
+// Finds the place of the origin relative to a triangle. Points beside the triangle by up to `beside` of its
+// height count as inner ones.
 fn above(a: vec3f, b: vec3f, c: vec3f, beside: f32) -> Above {
     let area = cross(b - a, c - a);
     let normal = unit(area);
@@ -71,7 +72,7 @@ fn above(a: vec3f, b: vec3f, c: vec3f, beside: f32) -> Above {
     return Above(normal, height, closest, -(closest.x * a + closest.y * b + closest.z * c), false);
 }
 
-// Whether the origin counts as inner though it is a little beside.
+// True if the origin counts as inner though it is a little beside the triangle.
 fn is_beside(here: Above) -> bool {
     return here.is_inner && any(here.weights < vec3f(0.0));
 }
@@ -157,7 +158,7 @@ fn find_above(node: u32, ring: vec2u, first: u32, end: u32, within: f32, reach: 
         // A node in the plane of a triangle, but outside the triangle, is not beneath it.
         let least = (SAME * nearest + ROUNDING * reach) * norm(nearest_normals);
         let is_behind = dot(nearest_way, nearest_normals) < -least;
-        // Who is behind a border is beside the surface.
+        // A node behind a border is beside the surface.
         if !(is_behind && at_border(nearest_row, nearest_weights != vec3f(0.0))) {
             let sign = select(1.0, -1.0, is_behind);
             let normal = select(unit(nearest_normals), sign * unit(nearest_way), nearest > ON * depth);
@@ -177,7 +178,7 @@ fn find_above(node: u32, ring: vec2u, first: u32, end: u32, within: f32, reach: 
     if beneath_row == NO_ROW {
         return;
     }
-    // Whoever is inside leaves by the shortest way.
+    // A node inside leaves by the shortest way.
     let leaves_elsewhere = -beneath > hidden && -beneath > SLIGHT * depth;
     if leaves_elsewhere || -beneath < over {
         for (var row = first; row < end; row++) {

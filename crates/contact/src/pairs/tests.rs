@@ -50,7 +50,7 @@ fn sheets_that_face_each_other_are_seen_with_their_distance() {
             assert_eq!(pair.in_order, pair.nodes[0] < 16);
         }
     }
-    // Looked at from behind, there is nothing to touch.
+    // Seen from behind, there is nothing to touch.
     places[16..].iter_mut().for_each(|place| place.z = -0.9);
     pairs.update(|node| places[node as usize]);
     assert!(found(&pairs, &places).is_empty());

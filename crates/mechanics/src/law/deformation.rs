@@ -34,8 +34,8 @@ pub struct Deformation<R> {
 }
 
 impl<R: Number> Deformation<R> {
-    /// From the displacement gradient H = ∂u/∂X. J ≤ 0 is the caller's to report: the measures are then
-    /// meaningless.
+    /// Computes the measures from the displacement gradient H = ∂u/∂X. The caller must report J ≤ 0: the
+    /// measures are then meaningless.
     #[inline(always)]
     pub fn from_displacement_gradient(h: &Tensor<R>) -> Self {
         let mut gradient = *h;

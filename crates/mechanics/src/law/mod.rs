@@ -148,7 +148,8 @@ pub trait Law: Copy + Send + Sync + 'static {
         isochoric + volumetric
     }
 
-    /// The stress in WGSL, its text in the file beside the law's; `None` of a law for the CPU only.
+    /// Returns the stress in WGSL, whose text is in the file next to the law's; `None` for a law for the CPU
+    /// only.
     fn shader(&self) -> Option<Shader>;
 
     /// Families of fibres, each with a direction in every cell.

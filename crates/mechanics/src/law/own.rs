@@ -75,12 +75,12 @@ pub trait OwnLaw: fmt::Debug + Send + Sync + 'static {
     }
 }
 
-/// A law of one's own among the others.
+/// A user's law among the others.
 #[derive(Clone, Copy)]
 pub struct Own(&'static dyn OwnLaw);
 
 impl AnyLaw {
-    /// A law of one's own. It stays in memory as long as the program runs.
+    /// Makes a law of a user's law. It stays in memory as long as the program runs.
     pub fn own(law: impl OwnLaw) -> Self {
         Self::Own(Own(Box::leak(Box::new(law))))
     }

@@ -1,5 +1,4 @@
-//! Laws in plane stress, for thin walls: the stretch λ₃ across the wall is the one at which the stress across
-//! it vanishes.
+//! Laws in plane stress, for thin walls: with the stretch λ₃ across the wall the stress across vanishes.
 //!
 //! In the frame of a wall C is known but for C₃₃ = λ₃². A law sees F = R with Rᵀ R = C, R upper triangular
 //! (Cholesky). This R differs from the true F by a rotation, which does not affect the stress. λ₃ makes the
@@ -27,7 +26,7 @@ pub struct InPlane<R> {
 }
 
 impl<R: Number> InPlane<R> {
-    /// From C₁₁ − 1, C₂₂ − 1 and C₁₂. Not a number where the wall is folded flat.
+    /// Makes the strain from C₁₁ − 1, C₂₂ − 1 and C₁₂. Not a number where the wall is folded flat.
     #[inline(always)]
     pub(crate) fn from_strain_twice(strain_twice: [R; 3]) -> Self {
         // √(1 + x) − 1 = x/(1 + √(1 + x)), without cancellation. Written out: closures are not compiled for
@@ -115,7 +114,7 @@ pub fn kirchhoff_across<R: Number>(stress: &Symmetric<R>, thickness_change: R) -
 pub struct Across {
     /// λ + 2μ [Pa]; infinite of an incompressible law.
     pub modulus: f64,
-    /// λ/(λ + 2μ), by how much a wall thins when its area grows; 1 of an incompressible law.
+    /// λ/(λ + 2μ), the ratio of thinning to growth of area of a wall; 1 for an incompressible law.
     pub coupling: f64,
 }
 
@@ -128,7 +127,7 @@ pub struct ThicknessSearch<R> {
     slope: R,
     /// τ [Pa] of the last step.
     last: R,
-    /// By how much ln λ₃ changed in it.
+    /// Last change of ln λ₃.
     moved: R,
 }
 

@@ -3,7 +3,7 @@
 // A tensor on its way to its principal axes.
 struct Principal {
     values: vec3f,
-    // The entries 23, 13, 12 beside the diagonal.
+    // The off-diagonal entries 23, 13, 12.
     beside: vec3f,
     // The axes so far, one per column.
     directions: mat3x3f,

@@ -1,4 +1,4 @@
-//! Laws for GPUs: each is a snippet of WGSL beside its Rust twin. This file joins a law with the functions
+//! Laws for GPUs: each is a snippet of WGSL next to its Rust twin. This file joins a law with the functions
 //! that it calls.
 
 /// The stress of a law in WGSL.

@@ -208,7 +208,7 @@ impl Cells {
         if matches!(self, Self::FullHex8(..)) { 8 } else { 1 }
     }
 
-    /// True where pressures are averaged, so that a point has none of its own.
+    /// True where pressures are averaged, so that a point has no pressure alone.
     pub fn averages_pressure(&self) -> bool {
         matches!(self, Self::AveragedTet4(_, Averaging::Nodal | Averaging::Variational) | Self::FullHex8(..))
     }
@@ -317,7 +317,7 @@ pub struct LocalNodes {
 }
 
 impl LocalNodes {
-    /// From the cells.
+    /// Makes the local nodes of some cells.
     pub fn new(cells: &CellBlock<4>) -> Self {
         let mut global: Vec<u32> = cells.nodes.iter().flatten().copied().collect();
         global.sort_unstable();

@@ -115,7 +115,7 @@ pub enum Motion {
     /// The mean of their displacements is a displacement [m] × curve, with weights that sum to 1. Each node
     /// by itself is free, as under a plate that tilts.
     Mean {
-        /// One for each node of the constraint.
+        /// Weights, one for each node of the constraint.
         weights: Vec<f64>,
         /// Displacement [m].
         by: Vector<f64>,
@@ -124,8 +124,8 @@ pub enum Motion {
     },
     /// Together they move as a rigid body, free in space.
     Rigid,
-    /// The volume that faces enclose grows by so much [m³] × curve from what it is at rest; a uniform
-    /// pressure on them does it.
+    /// The volume that faces enclose grows from its rest value by a volume [m³] × curve; a uniform pressure
+    /// on the faces acts as the force.
     Volume {
         /// Surface that encloses the volume.
         enclosure: Enclosure,

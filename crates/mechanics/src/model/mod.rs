@@ -74,7 +74,7 @@ impl MassScaling {
 pub struct Body {
     /// Its name.
     pub name: String,
-    /// The nodes of its own.
+    /// Its nodes, without shared ones.
     pub nodes: Range<u32>,
     /// The nodes of other bodies that its cells use, numbered in the model: the nodes of a wall on the
     /// boundary of a solid.
@@ -84,7 +84,7 @@ pub struct Body {
 }
 
 impl Body {
-    /// The model's number of a node of its mesh: its own nodes first, then those that it shares.
+    /// Returns the model's number of a node of its mesh: first the body's nodes, then the shared ones.
     pub fn node(&self, index: u32) -> u32 {
         let own = self.nodes.len() as u32;
         if index < own { self.nodes.start + index } else { self.shared[(index - own) as usize] }
@@ -204,7 +204,7 @@ fn picked<T: Clone>(values: &[T], cells: &[u32]) -> Vec<T> {
     cells.iter().map(|&cell| values[cell as usize].clone()).collect()
 }
 
-/// A cell counts as filled by so much at least: nodes that hang on slivers alone would move wildly.
+/// Least filled fraction of a cell: nodes that hang on slivers alone would move wildly.
 pub const LEAST_FRACTION: f64 = 0.1;
 
 /// A surface carried by a body.

@@ -48,7 +48,7 @@ impl SolverMethod {
         self.equations_mut().and_then(|solver| solver.contact_mut())
     }
 
-    /// Has something act on what finds forces at an instant, and on the solver of equations.
+    /// Applies an action to the forces at an instant, and to the solver of equations.
     pub(super) fn act(
         &mut self,
         forces: impl FnOnce(&mut Forces),

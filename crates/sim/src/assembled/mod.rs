@@ -328,7 +328,7 @@ impl Assembled {
         FailedLoadStep { number, of: self.steps.number, iterations: last.iterations(), residual }
     }
 
-    /// Keeps the iterations of the attempts of a step, those that failed, too.
+    /// Keeps the iterations of all attempts of a step, also of failed ones.
     fn note_attempts(&mut self, number: u64) {
         for (attempt, tried) in self.method.attempts().iter().enumerate() {
             self.effort.newton_iterations += tried.iterations() as u64;

@@ -95,7 +95,7 @@ impl Simulation {
         Self::of(world, participants, Between::default())
     }
 
-    /// From a state of this world on.
+    /// Makes a simulation that continues from a state of this world.
     ///
     /// # Errors
     /// If a stepper can't be made, or the state is of another world.
@@ -110,8 +110,8 @@ impl Simulation {
         Self::of(world, participants, between)
     }
 
-    /// From a state that another world was in, with displacements, velocities and the history of relaxing
-    /// laws. `None` where this world has other meshes, solvers or number types.
+    /// Makes a simulation that continues from a state of another world, with displacements, velocities and
+    /// the history of relaxing laws. `None` where this world has other meshes, solvers or number types.
     ///
     /// # Errors
     /// If a stepper can't be made.
@@ -527,7 +527,7 @@ impl Simulation {
         (self.evaluated && !self.meetings.is_empty()).then_some(&self.before[..])
     }
 
-    /// Goes back, or on, to a state of this world. Hands let go; forces of [`push`](Self::push) stay.
+    /// Goes to an earlier or later state of this world. Hands let go; forces of [`push`](Self::push) stay.
     ///
     /// # Errors
     /// If it is of another world, or a device fails. The simulation then stays as it was.
@@ -553,8 +553,8 @@ impl Simulation {
         Ok(())
     }
 
-    /// Brings some participants back to states of their parts; those that can't go back are made anew. Where
-    /// one can't be made, nothing changes.
+    /// Brings some participants back to states of their parts. Participants that can't go back are made anew.
+    /// Where one can't be made, nothing changes.
     fn put_back(
         &mut self,
         states: &[OwnState],
