@@ -48,7 +48,7 @@ fn nearest_weights(a: vec3f, b: vec3f, c: vec3f, p: vec3f) -> vec3f {
     return vec3f(1.0 - v - w, v, w);
 }
 
-// Whether the points of faces at a thing are those nearest to it.
+// True if the points of faces at a thing are the nearest ones.
 fn takes_nearest(thing: u32) -> bool {
     let kind = u32(thing_number(thing));
     return (HAS_SPHERE && kind == SPHERE || HAS_CAPSULE && kind == CAPSULE) && thing_number(thing + 1u) > 0.0;

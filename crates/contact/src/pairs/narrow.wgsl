@@ -25,7 +25,7 @@ struct Above {
     weights: vec3f,
     // The way from there [m].
     way: vec3f,
-    // Whether the origin is above or beneath the triangle.
+    // True if the origin is above or beneath the triangle.
     is_inner: bool,
 }
 
@@ -191,7 +191,7 @@ fn find_above(node: u32, ring: vec2u, first: u32, end: u32, within: f32, reach: 
     }
 }
 
-// Whether a way leads along a normal, or hardly against it.
+// True if a way leads along a normal, or hardly against it.
 fn is_before(normal: vec3f, way: vec3f) -> bool {
     return dot(normal, way) >= -FLAT * norm(way);
 }
