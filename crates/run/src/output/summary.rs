@@ -21,7 +21,7 @@ use super::{OutputError, StrainSummary, VolumeChange, constraints};
 pub struct Summary {
     /// `done`, `failed` or `interrupted`.
     pub status: &'static str,
-    /// Why it failed.
+    /// Reason of the failure.
     pub error: Option<Failure>,
     /// The bodies.
     pub bodies: Vec<BodySummary>,
@@ -49,9 +49,9 @@ pub struct Summary {
     pub guests: Vec<CoupledSurfaceSummary>,
     /// Cost of its equations; `null` where none were solved.
     pub solver: Option<Effort>,
-    /// How good the equilibria of a quasi-static run are; `null` of others.
+    /// Quality of the equilibria of a quasi-static run; `null` for other runs.
     pub equilibria: Option<Equilibria>,
-    /// Why a path by arc length ended before its last load step; `null` of all others.
+    /// Reason why a path by arc length ended before its last load step; `null` for all other runs.
     pub ended: Option<String>,
     /// The largest strain of each shell, over up to 1000 sampled instants.
     pub shell_strains: Vec<StrainSummary>,
@@ -72,7 +72,7 @@ pub struct Summary {
     pub real_time_factor: f64,
     /// The monitored critical time step; `null` of a quasi-static run.
     pub stability: Option<StabilitySummary>,
-    /// What mass scaling adds; `null` without it.
+    /// Effect of mass scaling; `null` without it.
     pub added_mass: Option<AddedMass>,
     /// Imbalance of the energies at the end, as a fraction of the largest; `null` of shells and with
     /// `implicit` and `static`.
@@ -83,7 +83,7 @@ pub struct Summary {
     /// Volume [m³] and pressure [Pa] of each constraint of volume at the end, by name.
     #[serde(serialize_with = "as_map")]
     pub volumes: Vec<(String, [f64; 2])>,
-    /// What to know before trusting the result.
+    /// Warnings to know before trusting the result.
     pub warnings: Vec<String>,
     /// Files written, as paths.
     pub files: Vec<String>,
@@ -186,7 +186,7 @@ pub(crate) fn output_failure(error: &OutputError, time: Option<f64>) -> Failure 
     Failure::new(FailureKind::Output, message, time)
 }
 
-/// That of a stopped run, and the checkpoint it left.
+/// Makes the failure of a stopped run, with the checkpoint that the run left.
 pub(crate) fn interrupted(time: f64, checkpoint: Option<&Path>) -> Failure {
     let way = match checkpoint {
         Some(path) => format!("go on with `--resume {}`", path.display()),
