@@ -1,5 +1,5 @@
-//! Remedies after a failed step. They depend on what the run does already: no text advises to switch on what
-//! is on, or to damp more where damping is the trouble.
+//! Remedies after a failed step. They depend on what the run does already. No text advises a setting that is
+//! already on, or more damping where damping is the trouble.
 
 use pliant_format::tables::OnUnstableName;
 use pliant_geometry::words::{counted, number};

@@ -145,8 +145,8 @@ fn compressive_force(fields: &CellFields) -> f64 {
 }
 
 /// Returns the compressive force [N/m] at which each element of a membrane on a solid wrinkles as short as
-/// its mean edge h. The force is E* h/2π: the value of E t³ k²/12 + E* / (2 k) without the bending term, at a
-/// wavelength 2π/k of two edges (Biot 1957). Returns `None` for other cells, and for membranes on no solid.
+/// its mean edge h. Biot (1957) gives E t³ k²/12 + E* / (2 k) at a wavelength 2π/k. Two edges and no bending
+/// term make E* h/2π. Returns `None` for other cells, and for membranes on no solid.
 fn wrinkling_forces(model: &Model, membrane: &Solid) -> Option<Vec<f64>> {
     if !matches!(membrane.cells, Cells::Membrane(..)) {
         return None;
