@@ -57,7 +57,7 @@ pub struct Meshing<'a> {
     pub now: &'static str,
 }
 
-/// As [`build_with`]; `watch` receives the progress of meshes of images.
+/// Builds like [`build_with`]; `watch` receives the progress of meshes of images.
 ///
 /// # Errors
 /// All mistakes that were found, with their places.
@@ -88,7 +88,7 @@ fn assembled(context: Context<'_>, shapes: Vec<BuiltBody>) -> Result<Built, Scen
 /// The mesh alone of a body of a scene, in metres, with remarks on how it was made.
 ///
 /// # Errors
-/// What is wrong with the mesh, or that there is no such body.
+/// If the mesh has mistakes, or there is no such body.
 pub fn mesh_of(
     scene: &Scene,
     body: &str,

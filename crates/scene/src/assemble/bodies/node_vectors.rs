@@ -12,7 +12,7 @@ use pliant_geometry::{DataArray, Mesh};
 
 use super::Meshed;
 
-/// What is wrong with a table of vectors, and what to do about it.
+/// Fault of a table of vectors, with its remedy.
 #[derive(Debug)]
 struct VectorFault {
     message: String,
