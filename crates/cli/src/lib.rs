@@ -45,8 +45,8 @@ pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
     program(words, wants_json, |arguments| commands::execute(arguments.command))
 }
 
-/// Does what a command line says, of any program with commands: reads it, executes it, and prints errors, as
-/// an object on standard output, too, where that is promised. The code that the process is to end with.
+/// Executes a command line of any program with commands, and returns the exit code. Prints errors, also as an
+/// object on standard output if `wants_json` says so.
 pub fn program<A: Parser>(
     words: impl IntoIterator<Item = OsString>,
     wants_json: impl FnOnce(&A) -> bool,

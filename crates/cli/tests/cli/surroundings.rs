@@ -1,5 +1,5 @@
 //! The environment of a run, through the real binary: signals, locked folders, links in them, standard
-//! streams that can't be written, stale files, paths that are not files.
+//! streams that can't be written, stale files. Also paths that are not files.
 
 use std::fs::{self, File};
 use std::os::unix::fs::symlink;
