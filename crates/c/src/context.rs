@@ -1,5 +1,5 @@
-//! The context: a table of what a program has open. A handle is a place in the table and how often the place
-//! was used, so that a closed handle is known as one, however often its place was used again.
+//! The context: a table of the open items of a program. A handle holds a place in the table and how often
+//! that place was used. So a closed handle is recognised, however often its place is used again.
 
 use std::mem::MaybeUninit;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -10,19 +10,19 @@ use pliant_sim::panicked;
 use crate::open::{OpenScene, OpenSnapshot, Shared};
 use crate::status::{Fault, PliantError, PliantStatus, reported};
 
-/// All that a program has open. Opened by `pliant_context_open`.
+/// Table of everything that a program has open. Opened by `pliant_context_open`.
 pub struct PliantContext {
     slots: Mutex<Vec<Slot>>,
 }
 
 /// A place of the table.
 struct Slot {
-    /// How often it was used.
+    /// Number of times that the place was used.
     uses: u32,
     item: Option<Item>,
 }
 
-/// What a handle means.
+/// Target of a handle.
 #[derive(Clone)]
 pub(crate) enum Item {
     Scene(Arc<Mutex<OpenScene>>),

@@ -1,5 +1,5 @@
-//! Scenes: from a file or a text, with other values and meshes of the program, until simulations are made of
-//! them.
+//! Scenes: from a file or a text, with other values and meshes of the program. Simulations are made from
+//! scenes.
 
 use std::ffi::c_char;
 use std::path::Path;
@@ -32,11 +32,11 @@ pub const PLIANT_HEXES: u32 = 12;
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct PliantCells {
-    /// `PLIANT_TETS` or another kind; the numbers are those of VTK.
+    /// `PLIANT_TETS` or another kind, with the numbers of VTK.
     pub kind: u32,
-    /// How many cells.
+    /// Number of cells.
     pub count: usize,
-    /// Nodes of a cell after those of the one before, from 0.
+    /// Nodes of all cells, cell after cell, counted from 0.
     pub nodes: *const u32,
     /// A label for each cell, or null.
     pub labels: *const i32,
@@ -63,8 +63,8 @@ pub unsafe extern "C" fn pliant_scene_load(
     }
 }
 
-/// Opens a scene from its text, of so many bytes. Files that it names are relative to `folder`; null is the
-/// folder of the process. `name` is what errors call it; null is `scene.toml`.
+/// Opens a scene from its text of `length` bytes. Files that it names are relative to `folder`; null is the
+/// folder of the process. `name` is the name of the text in errors; null is `scene.toml`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_scene_parse(
     context: *const PliantContext,
@@ -159,7 +159,7 @@ pub unsafe extern "C" fn pliant_scene_give_mesh(
     }
 }
 
-/// Cells of the program as those of a mesh.
+/// Makes cells of a mesh from cells of the program.
 ///
 /// # Safety
 /// Pointers of `cells` are what the caller owes.

@@ -37,9 +37,9 @@ pub(crate) unsafe fn running(
     }
 }
 
-/// Makes a simulation of a scene as it is now, at its start. It computes on so many threads of its own, 1024
-/// at most; 0 takes `threads` of the scene's `[run]`. Results do not depend on their number. Images are
-/// meshed and shapes built here: this can take seconds.
+/// Makes a simulation of a scene as it is now, at its start. It computes on threads of its own, 1024 at most;
+/// with 0 it takes `threads` of the scene's `[run]`. Results do not depend on their number. Images are meshed
+/// and shapes built here: this can take seconds.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_simulation_open(
     context: *const PliantContext,
@@ -96,7 +96,7 @@ pub unsafe extern "C" fn pliant_simulation_close(
     }
 }
 
-/// Where a simulation is, and its sizes.
+/// Time, step and sizes of a simulation.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct PliantNow {
@@ -110,7 +110,7 @@ pub struct PliantNow {
     pub nodes: u64,
 }
 
-/// Tells where a simulation is.
+/// Reports time, step and sizes of a simulation.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_now(
     context: *const PliantContext,
@@ -128,8 +128,8 @@ pub unsafe extern "C" fn pliant_now(
     }
 }
 
-/// Goes so many steps on. `done`, if it is not null, gets how many were taken, also where one fails or
-/// another thread asks to stop. After a failure the simulation stands at the last good instant; restore a
+/// Takes `count` steps. `done`, if it is not null, gets the number of steps taken, also after a failure or a
+/// stop from another thread. After a failure the simulation stands at the last good instant; restore a
 /// snapshot, or close it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_step(
@@ -143,8 +143,7 @@ pub unsafe extern "C" fn pliant_step(
     unsafe { go(context, simulation, done, error, |_, taken| Ok(count - taken)) }
 }
 
-/// Goes on until a time [s], to the instant nearest to it; else as `pliant_step`. A time that has passed
-/// takes no step.
+/// Steps to the instant nearest to a time [s], like `pliant_step`. A time that has passed takes no step.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_run_until(
     context: *const PliantContext,
@@ -262,7 +261,7 @@ pub unsafe extern "C" fn pliant_push(
     }
 }
 
-/// What a name is looked for among.
+/// Bodies, as the kind of a name.
 pub const PLIANT_BODIES: u32 = 0;
 /// Surfaces that bodies carry.
 pub const PLIANT_SURFACES: u32 = 1;

@@ -87,8 +87,8 @@ pub unsafe extern "C" fn pliant_snapshot_bytes(
     }
 }
 
-/// Reads a snapshot of a simulation of the same scene from bytes. `PLIANT_STATUS_BAD_SNAPSHOT` tells of
-/// others, and of damage.
+/// Reads a snapshot of a simulation of the same scene from bytes. Other and damaged snapshots give
+/// `PLIANT_STATUS_BAD_SNAPSHOT`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_snapshot_read(
     context: *const PliantContext,

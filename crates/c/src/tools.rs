@@ -16,9 +16,9 @@ use crate::values::unknown;
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct PliantTool {
-    /// Where its frame is [m].
+    /// Origin of its frame [m].
     pub position: [f64; 3],
-    /// How it is turned: a unit quaternion x, y, z, w.
+    /// Rotation of its frame: a unit quaternion x, y, z, w.
     pub rotation: [f64; 4],
     /// The angle [rad] between its jaws; 0 without any.
     pub opening: f64,
@@ -58,9 +58,9 @@ unsafe fn goal(position: *const f64, rotation: *const f64) -> Result<Pose, Fault
 }
 
 /// Leads a tool to a pose within a time [s] from now, on a straight way and the shortest turn; there it
-/// stays. Its jaws go on as they were going. `rotation` is a quaternion x, y, z, w of any length but 0.
-/// `arrival`, if it is not null, gets the time [s] at which it is there: later than asked for where nodes
-/// would be passed over on the way.
+/// stays. The motion of its jaws continues. `rotation` is a quaternion x, y, z, w of any length but 0.
+/// `arrival`, if it is not null, gets the time [s] of arrival. That time is later than asked for if the tool
+/// would pass over nodes on the way.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_tool_lead(
     context: *const PliantContext,
@@ -83,8 +83,8 @@ pub unsafe extern "C" fn pliant_tool_lead(
     }
 }
 
-/// Opens or closes the jaws of a tool to an angle [rad] within a time [s] from now, while it goes on as it
-/// was going; else as `pliant_tool_lead`.
+/// Opens or closes the jaws of a tool to an angle [rad] within a time [s] from now. The motion of the tool
+/// continues. `arrival` is as in `pliant_tool_lead`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_tool_open(
     context: *const PliantContext,
@@ -130,7 +130,7 @@ pub unsafe extern "C" fn pliant_tool_lead_open(
     }
 }
 
-/// Tells where a tool, an obstacle or a jaw (`grasper.upper`, `grasper.lower`) is, and what it feels.
+/// Reports the pose of a tool, an obstacle or a jaw (`grasper.upper`, `grasper.lower`), and the forces on it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_tool(
     context: *const PliantContext,
