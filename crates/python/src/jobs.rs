@@ -74,8 +74,8 @@ pub fn on_thread<T: Send + 'static>(
     }
 }
 
-/// Time for which the result of a call is awaited awake at first: to wake a thread takes longer than a short
-/// step, and that of the pool goes to sleep meanwhile.
+/// Time for which a call waits awake for its result at first. To wake a thread takes longer than a short
+/// step, and the thread of the pool goes to sleep meanwhile.
 const AWAKE: Duration = Duration::from_micros(200);
 
 /// Waits for a slice of time without the interpreter, at first awake.
