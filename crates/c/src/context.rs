@@ -74,7 +74,7 @@ impl PliantContext {
     pub(crate) fn close(&self, handle: u64) -> Result<(), Fault> {
         let mut slots = self.slots();
         let item = found(&mut slots, handle)?.item.take().ok_or_else(closed)?;
-        // What was open is dropped without the table.
+        // The item is dropped outside of the lock on the table.
         drop(slots);
         if let Item::Simulation(shared) = &item {
             shared.stop();
@@ -122,11 +122,11 @@ fn wrong(wanted: &str, given: &Item) -> Fault {
     Fault::new(PliantStatus::BadHandle, format!("the handle is of a {}, not of a {wanted}", given.kind()))
 }
 
-/// The border: what a call does, with its errors and panics reported to the caller. A panic closes the handle
-/// that it was about.
+/// The border: executes a call, and reports errors and panics to the caller. A panic closes the handle of the
+/// call.
 ///
 /// # Safety
-/// `context` and `error` are null or point to what they say.
+/// `context` and `error` are null or point to values of their types.
 pub(crate) unsafe fn call(
     context: *const PliantContext,
     handle: u64,

@@ -48,7 +48,7 @@ pub unsafe extern "C" fn pliant_grip_nodes(
     grip: *mut u32,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             needed(grip, "grip")?;
@@ -93,7 +93,7 @@ pub unsafe extern "C" fn pliant_grip_surface(
     grip: *mut u32,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             needed(grip, "grip")?;
@@ -118,7 +118,7 @@ pub unsafe extern "C" fn pliant_grip_surface(
     }
 }
 
-/// Moves a grip to a place [m]: what it holds is pulled there from the next step on.
+/// Moves a grip to a place [m]: it pulls its nodes there from the next step on.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_grip_move(
     context: *const PliantContext,
@@ -127,7 +127,7 @@ pub unsafe extern "C" fn pliant_grip_move(
     place: *const f64,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             let place = numbers(place, "place")?;
@@ -141,7 +141,7 @@ pub unsafe extern "C" fn pliant_grip_move(
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct PliantGrip {
-    /// The mean of what it holds [m].
+    /// Mean place of its nodes [m].
     pub point: [f64; 3],
     /// Place to which the grip pulls [m].
     pub place: [f64; 3],
@@ -160,7 +160,7 @@ pub unsafe extern "C" fn pliant_grip(
     now: *mut PliantGrip,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             own.see_places()?;
@@ -179,7 +179,7 @@ pub unsafe extern "C" fn pliant_grip_release(
     grip: u32,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             own.held.get(grip)?;

@@ -51,7 +51,7 @@ pub unsafe extern "C" fn pliant_scene_load(
     scene: *mut PliantScene,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         call(context, 0, error, |context| {
             needed(scene, "scene")?;
@@ -75,7 +75,7 @@ pub unsafe extern "C" fn pliant_scene_parse(
     scene: *mut PliantScene,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         call(context, 0, error, |context| {
             needed(scene, "scene")?;
@@ -108,7 +108,7 @@ pub unsafe extern "C" fn pliant_scene_set(
     assignment: *const c_char,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         call(context, scene, error, |context| {
             let scene = context.scene(scene)?;
@@ -135,7 +135,7 @@ pub unsafe extern "C" fn pliant_scene_give_mesh(
     kinds: usize,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         call(context, scene, error, |context| {
             let scene = context.scene(scene)?;
@@ -162,7 +162,7 @@ pub unsafe extern "C" fn pliant_scene_give_mesh(
 /// Makes cells of a mesh from cells of the program.
 ///
 /// # Safety
-/// Pointers of `cells` are what the caller owes.
+/// Pointers of `cells` are valid, as the caller promises.
 unsafe fn block(cells: &PliantCells, points: usize) -> Result<CellBlock, Fault> {
     let kind = match cells.kind {
         PLIANT_LINES => CellKind::Line,
@@ -202,7 +202,7 @@ pub unsafe extern "C" fn pliant_scene_close(
     scene: PliantScene,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         call(context, scene, error, |context| {
             context.scene(scene)?;

@@ -48,7 +48,7 @@ pub unsafe extern "C" fn pliant_simulation_open(
     simulation: *mut PliantSimulation,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         call(context, scene, error, |context| {
             needed(simulation, "simulation")?;
@@ -87,7 +87,7 @@ pub unsafe extern "C" fn pliant_simulation_close(
     simulation: PliantSimulation,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         call(context, simulation, error, |context| {
             context.simulation(simulation)?;
@@ -118,7 +118,7 @@ pub unsafe extern "C" fn pliant_now(
     now: *mut PliantNow,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             let Running { simulation, .. } = &*own;
@@ -139,7 +139,7 @@ pub unsafe extern "C" fn pliant_step(
     done: *mut u64,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe { go(context, simulation, done, error, |_, taken| Ok(count - taken)) }
 }
 
@@ -152,7 +152,7 @@ pub unsafe extern "C" fn pliant_run_until(
     done: *mut u64,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         go(context, simulation, done, error, |now, _| {
             finite(&[time], "time")?;
@@ -217,15 +217,16 @@ unsafe fn go(
     status
 }
 
-/// Asks the thread that steps a simulation to stop after its step. A step that takes long is given up: it is
-/// not taken. Without such a thread, the next call that steps returns at once. Any thread may ask.
+/// Asks the thread that steps a simulation to stop after its step. A step that takes long is abandoned, and
+/// the simulation stays at the instant before. Without such a thread, the next call that steps returns at
+/// once. Any thread may ask.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_stop(
     context: *const PliantContext,
     simulation: PliantSimulation,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         call(context, simulation, error, |context| {
             context.simulation(simulation)?.stop();
@@ -244,7 +245,7 @@ pub unsafe extern "C" fn pliant_push(
     count: usize,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             let numbers = array(forces, count.saturating_mul(3), "forces")?;
@@ -288,7 +289,7 @@ pub unsafe extern "C" fn pliant_name(
     length: *mut usize,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             let names = names(own, kind)?;

@@ -12,7 +12,7 @@ use pliant_sim::Failure;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PliantStatus {
-    /// It did what was asked.
+    /// The call succeeded.
     Ok = 0,
     /// A pointer is null that must not be.
     Null = 1,
@@ -38,7 +38,7 @@ pub enum PliantStatus {
     Failed = 11,
     /// The solver or the device can't do this.
     Unsupported = 12,
-    /// Another thread asked to stop; what was done so far stays.
+    /// Another thread asked to stop; the steps taken so far stay.
     Stopped = 13,
     /// The program was built for another version of this interface.
     Version = 14,

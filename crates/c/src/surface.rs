@@ -61,7 +61,7 @@ pub unsafe extern "C" fn pliant_surface_open(
     surface: *mut PliantSurface,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             needed(surface, "surface")?;
@@ -101,7 +101,7 @@ pub unsafe extern "C" fn pliant_surface_triangles(
     capacity: usize,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             let all = own.surface(surface)?.skin.triangles();
@@ -126,7 +126,7 @@ pub unsafe extern "C" fn pliant_surface_positions(
     buffer: PliantBuffer,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             own.see_places()?;
@@ -141,7 +141,7 @@ pub unsafe extern "C" fn pliant_surface_positions(
     }
 }
 
-/// Copies the unit normals of the vertices: the mean normals of the triangles around each, by area.
+/// Copies the unit normals of the vertices: the mean of the normals of the triangles around each, by area.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_surface_normals(
     context: *const PliantContext,
@@ -150,7 +150,7 @@ pub unsafe extern "C" fn pliant_surface_normals(
     buffer: PliantBuffer,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             let found = own.bring(surface, true, |open| (&open.skin, &mut open.own))?;
@@ -173,7 +173,7 @@ pub unsafe extern "C" fn pliant_surface_lend(
     normals: *mut *const f64,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             needed(positions, "positions")?;

@@ -25,7 +25,7 @@ pub struct PliantNodes {
     pub count: u64,
 }
 
-/// There is nothing of a name; those that there are.
+/// Fault of an unknown name, with the known names.
 pub(crate) fn unknown(own: &Running, kind: u32, what: &str, name: &str) -> Fault {
     let known = names(own, kind).unwrap_or_default();
     let those =
@@ -58,7 +58,7 @@ pub unsafe extern "C" fn pliant_body(
     found: *mut PliantNodes,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| give(found, "found", nodes(own, some_text(body, "body")?)?))
     }
@@ -84,7 +84,7 @@ pub unsafe extern "C" fn pliant_nodes(
     buffer: PliantBuffer,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             let PliantNodes { first, count } = nodes(own, some_text(body, "body")?)?;
@@ -146,7 +146,7 @@ pub unsafe extern "C" fn pliant_field(
     components: *mut usize,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             let (on, name) = (some_text(on, "on")?, text(name, "name")?);
@@ -208,7 +208,7 @@ pub unsafe extern "C" fn pliant_reaction(
     force: *mut [f64; 3],
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             needed(force, "force")?;
@@ -229,7 +229,7 @@ pub unsafe extern "C" fn pliant_contact_force(
     force: *mut [f64; 3],
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             needed(force, "force")?;
@@ -269,7 +269,7 @@ pub unsafe extern "C" fn pliant_energies(
     energies: *mut PliantEnergies,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             own.look()?;
@@ -290,7 +290,7 @@ pub unsafe extern "C" fn pliant_fingerprint(
     fingerprint: *mut u64,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             own.see_places()?;

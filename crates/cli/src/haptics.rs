@@ -147,7 +147,7 @@ fn failed(failure: pliant_sim::Failure) -> Failure {
     Failure::plain(failure.message, "")
 }
 
-/// Starts the haptic thread: with a trace, after the tool has come to where this begins, or with a device.
+/// Starts the haptic thread with a device, or with a trace after the tool has reached the trace's first pose.
 fn start(
     arguments: &Haptics,
     settings: Settings,
@@ -298,7 +298,7 @@ struct Snapshots {
     start: State,
     /// Times [s] and states, the newest last.
     states: VecDeque<(f64, State)>,
-    /// Failures so far, and those in a row that went back to the start.
+    /// Failures so far, and successive failures that went back to the start.
     failures: usize,
     in_a_row: usize,
 }
@@ -466,8 +466,8 @@ fn words(report: &Report, pace: &Pace, estimate: &Estimate) -> String {
     )
 }
 
-/// The stiffest coupling on the model that was pressed most: what the theory says and what a simulated device
-/// holds.
+/// Finds the stiffest coupling on the model that was pressed most: the limit of the theory, and the limit of
+/// a simulated device.
 fn stiffest(model: &LocalModel, settings: Settings) -> Result<String, HapticsError> {
     let hand = Hand::default();
     // The time ahead damps as K times that, so it counts as a delay does.

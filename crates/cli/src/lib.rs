@@ -35,11 +35,11 @@ use clap::Parser;
 pub use pictures::{FinalPicture, look_of_world};
 pub use report::{Bar, Failure, say, tell};
 
-/// The code of a process that did what it was to do.
+/// Exit code of a process that succeeded.
 pub const SUCCESS: u8 = 0;
 
-/// Does what a command line says, whose first word is the program: prints, writes files, opens a window. The
-/// code that the process is to end with.
+/// Executes a command line, whose first word is the program: prints, writes files, opens a window. Returns
+/// the exit code.
 pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
     let wants_json = |arguments: &arguments::Arguments| arguments.command.wants_json();
     program(words, wants_json, |arguments| commands::execute(arguments.command))

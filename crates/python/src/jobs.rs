@@ -14,8 +14,8 @@ use crate::errors::Trouble;
 /// Time between two looks at signals.
 const SLICE: Duration = Duration::from_millis(50);
 
-/// Runs a job on a pool. What a signal raises ends it through `stop`, is waited for, and then raised; the
-/// result comes with it.
+/// Runs a job on a pool. An exception from a signal stops the job through `stop`; the call waits for the job
+/// and returns the exception with the result.
 pub fn on_pool<T: Send + 'static>(
     py: Python<'_>,
     pool: &rayon::ThreadPool,

@@ -20,7 +20,7 @@ use std::ffi::OsString;
 
 use pyo3::prelude::*;
 
-/// Does what a command line says; the code that the process is to end with.
+/// Executes a command line; returns the exit code.
 #[pyfunction]
 fn main(py: Python<'_>, words: Vec<OsString>) -> u8 {
     py.detach(|| pliant_command::main(words))

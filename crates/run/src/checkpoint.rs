@@ -501,7 +501,7 @@ impl<'a> Checkpoints<'a> {
         self.schedule.stride(time, step)
     }
 
-    /// Removes those after some steps.
+    /// Removes checkpoints later than a number of steps.
     pub(crate) fn remove_after(&self, steps: u64) -> Result<(), OutputError> {
         let folder = self.folder.path();
         let all = checkpoints_in(folder).map_err(|error| OutputError::new(folder, error))?;
@@ -510,7 +510,7 @@ impl<'a> Checkpoints<'a> {
             .try_for_each(|(_, later)| fs::remove_file(later).map_err(|error| OutputError::new(later, error)))
     }
 
-    /// Writes one, and removes those before the last two.
+    /// Writes a checkpoint, and removes earlier checkpoints except the last two.
     pub fn write(
         &self,
         progressed: &Progressed,

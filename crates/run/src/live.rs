@@ -51,9 +51,8 @@ impl Live {
         Ok(Self::of(world, world.simulation()?))
     }
 
-    /// Plays a world on from where a run of another one stands, with displacements, velocities and what
-    /// relaxing laws remember. `None` where this one has another mesh, solver or precision than that
-    /// `before`.
+    /// Continues the run of another world, `before`, in this world: with displacements, velocities and the
+    /// internal variables of relaxing laws. Returns `None` if the worlds differ in mesh, solver or precision.
     ///
     /// # Errors
     /// If a stepper can't be made.
@@ -75,7 +74,7 @@ impl Live {
         Ok(())
     }
 
-    /// Halves the steps from here on. Hands let go.
+    /// Halves the steps from here on, and releases all grips.
     ///
     /// # Errors
     /// If the steps can't be halved, the state can't be taken, or a stepper can't be made.
@@ -113,8 +112,9 @@ impl Live {
         }
     }
 
-    /// The points shown at the instant, found on the GPU where the state lies, with a value each; `given`
-    /// takes the place of those given before. `None` where the solver keeps its state in ordinary memory.
+    /// Returns the displayed points at the instant with a value each, computed on the GPU where the state
+    /// lies. `given` replaces the earlier given values. Returns `None` if the solver keeps its state in
+    /// ordinary memory.
     #[cfg(feature = "gpu")]
     pub fn place(
         &mut self,

@@ -70,7 +70,7 @@ const SAMPLES_A_LOOK: usize = 50;
 const REPORT: Duration = Duration::from_millis(100);
 
 /// Runs a world and writes its outputs, `plot.svg` and `summary.md`. A failure of the run, or of writing
-/// while it runs, is in the summary; whatever was written before stays.
+/// while it runs, is in the summary; earlier output stays.
 ///
 /// # Errors
 /// If the outputs can't be opened.
@@ -254,7 +254,7 @@ impl<'a, 'env> Run<'a, 'env> {
         options: Options<'_>,
     ) -> Outcome {
         let failure = self.go(&mut simulation).err();
-        // What the run has failed at counts before what its outputs have.
+        // A failure of the run takes precedence over a failure of its outputs.
         let failure = failure.or(self.outputs.end().err());
         let failure = failure.map(|failure| self.advised(failure, &simulation));
         let picture = options.picture.filter(|_| failure.is_none());
@@ -470,7 +470,7 @@ impl Observer for Run<'_, '_> {
         Ok(())
     }
 
-    /// Shows what was found until then to those who have not looked at it.
+    /// Shows the results until the failure to outputs that have not seen them.
     fn step_failed(&mut self, simulation: &mut Simulation) {
         let seen = simulation.time();
         if !simulation.keeps_what_it_found() {

@@ -266,7 +266,7 @@ impl Sweep {
         })
     }
 
-    /// Does one run in a folder of its own within a folder.
+    /// Does one run in a folder of its own, below a folder.
     pub(crate) fn run_one(
         &self,
         run: usize,

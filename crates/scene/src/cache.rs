@@ -150,7 +150,7 @@ impl MeshCache {
         Self::default()
     }
 
-    /// A folder of its own, of a gigabyte at most; made when it is needed.
+    /// Makes a cache in a folder, of a gigabyte at most; the folder is made when it is needed.
     pub fn in_folder(folder: PathBuf) -> Self {
         Self { folder: Some(folder), limit: DEFAULT_LIMIT }
     }
@@ -183,7 +183,7 @@ impl MeshCache {
         is_sound(&mesh).then_some(Kept { mesh, notes, doubts })
     }
 
-    /// Keeps a mesh under its key, and drops what was used longest ago where there is more than the limit.
+    /// Stores a mesh under its key, and deletes the files unused for longest above the limit.
     pub(crate) fn put(&self, key: &Key, kept: &Kept) -> io::Result<()> {
         let Kept { mesh, notes, doubts } = kept.clone();
         let points = mesh.points.into_iter().map(Into::into).collect();
@@ -231,7 +231,7 @@ impl MeshCache {
         Some(self.folder.as_ref()?.join(&key.0).with_extension(kind.1))
     }
 
-    /// Drops the files used longest ago but one, until all take no more than the limit.
+    /// Deletes the files unused for longest except the newest, until all files fit the limit.
     fn drop_oldest(&self, folder: &Path, newest: &Path) -> io::Result<()> {
         let endings = [MESH.1, GRID.1, PART];
         let own =

@@ -89,7 +89,7 @@ impl World {
         self.participants.iter().any(|part| part.built.touches(on))
     }
 
-    /// Finds what the view names and nothing has, and a view that leaves nothing.
+    /// Reports names in the view that nothing has, and a view that shows nothing.
     pub(crate) fn check_view(&self, found: &mut Vec<Diagnostic>) {
         let view = &self.scene.view;
         let names = self.region_names(view.on.as_deref());

@@ -99,7 +99,7 @@ impl World {
         Ok(world)
     }
 
-    /// Refuses unequal load steps of a participant beside others.
+    /// Refuses unequal load steps in a scene with several participants.
     fn check_load_steps(&self) -> Result<(), SceneErrors> {
         let Some(part) = self.participants.iter().find(|part| part.plan.steps.ends.is_some()) else {
             return Ok(());

@@ -16,8 +16,8 @@ use crate::arguments::{Arguments, Command, Render};
 use crate::report::{Failure, say};
 use crate::signals;
 
-/// Draws what a command line names; of a folder of scenes it makes a page, or the pictures that the folder
-/// lists.
+/// Draws the scene, run or file of a command line. For a folder of scenes it makes a page, or the pictures
+/// that the folder lists.
 pub fn render(arguments: &Render) -> Result<u8, Failure> {
     let film = arguments.film.as_deref().map(film_kind).transpose()?;
     if arguments.gallery {
@@ -27,7 +27,7 @@ pub fn render(arguments: &Render) -> Result<u8, Failure> {
     if scenes.is_empty() { draw(arguments, film) } else { page(arguments, &scenes) }
 }
 
-/// The list of pictures in a folder of scenes, and what they were made of.
+/// The list of pictures in a folder of scenes, and the hashes of their sources.
 const LIST: &str = "gallery.txt";
 const SUMS: &str = "gallery.sums";
 

@@ -107,7 +107,8 @@ struct Columns {
     contacts: Vec<usize>,
     /// Contacts of each tool and obstacle that has several.
     things: Vec<Vec<usize>>,
-    /// The point [m] about which moments of reactions are taken, and what each of them prescribes.
+    /// The point [m] about which moments of reactions are taken, and the nodes and components of each
+    /// constraint.
     moments: Option<([f64; 3], Vec<Held>)>,
     energy: bool,
     probes: Vec<Probe>,
@@ -355,8 +356,8 @@ impl Rows {
         OutputError::new(&self.path, error)
     }
 
-    /// Writes a row in one go; of one that does not fit on the disk nothing stays. A row that stands there
-    /// already is passed over; any other is cut off with all after it.
+    /// Writes a row in one go; a row that does not fit on the disk leaves no part. A row that is there
+    /// already is skipped; any other row is cut off with all later ones.
     fn write(&mut self, mut row: String) -> Result<(), OutputError> {
         row.push('\n');
         if self.beyond.starts_with(row.as_bytes()) {

@@ -60,7 +60,7 @@ impl FieldMesh {
         self.merged.as_ref().unwrap_or_else(|| &self.parts[0].1.mesh)
     }
 
-    /// The participant of a point, what its mesh is of, and its number there.
+    /// Returns the participant of a point, the participant's mesh, and the point's number there.
     fn part_of(&self, point: u32) -> Option<(usize, &ParticipantMesh, usize)> {
         let mut point = point as usize;
         for (index, own) in &self.parts {

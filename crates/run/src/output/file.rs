@@ -39,7 +39,7 @@ pub(crate) fn create(path: &Path) -> io::Result<File> {
     }
 }
 
-/// Opens a file that is there, to read it and write on.
+/// Opens an existing file to read it and append to it.
 pub(crate) fn reopen(path: &Path) -> io::Result<File> {
     check_own(path)?;
     let file = OpenOptions::new().read(true).write(true).open(path)?;

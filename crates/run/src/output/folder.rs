@@ -183,7 +183,8 @@ impl Lock {
         }
     }
 
-    /// Leaves the number of this process to those who come later. A lock without it holds as well.
+    /// Writes the number of this process into the lock, for later processes. A lock without a number holds as
+    /// well.
     fn sign(&self) {
         let mut file = &self.file;
         let _ = self.file.set_len(0).and_then(|()| write!(file, "{}", std::process::id()));

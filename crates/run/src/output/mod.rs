@@ -112,8 +112,7 @@ impl<'a> Recovered<'a> {
         self.now.at(solid, cell, step)
     }
 
-    /// Some of all cells of a solid. Those that nobody has asked for before take one pass over the cells
-    /// together.
+    /// Returns some fields of all cells of a solid. New fields take one pass over the cells together.
     fn of(&self, solid: usize, wanted: &[FieldName]) -> Vec<CellNumbers> {
         let mut known = self.solids[solid].borrow_mut();
         let mut missing: Vec<FieldName> = Vec::new();
@@ -179,7 +178,7 @@ pub(crate) trait Output: Send {
     /// Returns what the output has written so far.
     fn written(&self) -> Written;
 
-    /// Removes what an interrupted run had written beyond the end of the one that went on with it.
+    /// Removes the later output of an interrupted run, after the end of the run that continued it.
     fn finish(&mut self) -> Result<(), OutputError>;
 }
 

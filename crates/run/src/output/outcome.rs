@@ -80,7 +80,7 @@ pub(crate) struct PartOutcome {
     /// Hourglass energy over the internal one.
     pub hourglass_share: f64,
     pub watched: Watched,
-    /// The critical time step as it was seen; `None` of a run without inertia.
+    /// The monitored critical time step; `None` for a run without inertia.
     pub stability: Option<Stability>,
     /// Quality of the equilibria, if the participant found some by dynamic relaxation.
     pub equilibria: Option<Equilibria>,

@@ -142,7 +142,7 @@ impl<'scope> Outputs<'scope> {
         }
     }
 
-    /// Removes rows and frames beyond those that were taken up.
+    /// Removes rows and frames after those that a resumed run continues.
     pub(crate) fn remove_later(&mut self) -> Result<(), OutputError> {
         self.near.iter_mut().try_for_each(|(_, output)| output.finish())?;
         if let Some(far) = &self.far {
@@ -185,7 +185,7 @@ impl<'scope> Far<'scope> {
     }
 }
 
-/// Does what comes in, until nobody sends any more.
+/// Executes tasks until the sender is gone.
 fn work(world: &World, mut outputs: Vec<Own>, tasks: &Receiver<Task>) -> Result<(), Failure> {
     // Parallel loops stay on this thread, which is all of a pool of its own.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();

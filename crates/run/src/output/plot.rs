@@ -69,7 +69,7 @@ pub(crate) fn plot(world: &World, history: &History) -> Result<String, String> {
         };
         let energies = [
             energy("external work", |e| e.external),
-            // What viscous laws have dissipated is not known apart from it.
+            // The internal energy includes the dissipation of viscous laws, which is not known separately.
             energy("internal (stored and viscous)", |e| e.internal),
             energy("kinetic", |e| e.kinetic),
             energy("damping", |e| e.damping),

@@ -41,7 +41,8 @@ pub struct Summary {
     pub critical_step: Option<f64>,
     /// The element that sets the bound.
     pub limiting_element: Option<LimitingElement>,
-    /// Each participant, of a scene with several; what follows is then of the first participant that has it.
+    /// The participants of a scene with several; later fields are then of the first participant that has
+    /// them.
     pub participants: Vec<ParticipantSummary>,
     /// The ties between participants.
     pub ties: Vec<TieSummary>,
@@ -208,7 +209,7 @@ pub(crate) fn bodies(built: &Built) -> Vec<BodySummary> {
         let volume = |solid: &pliant_mechanics::model::Solid| -> f64 {
             (0..solid.cells.len()).map(|cell| solid.cells.volume(cell)).sum()
         };
-        // Of its own cells: its nodes may have the mass of a wall, too.
+        // Mass of its own cells: its nodes may carry the mass of a wall, too.
         let of_cells = || {
             let mut mass = vec![0.0; built.model.node_count()];
             solids.clone().for_each(|solid| solid.add_mass(&mut mass));

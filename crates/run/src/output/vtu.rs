@@ -18,7 +18,7 @@ use super::{Frame, Output, OutputError, Written, time_of};
 pub(super) struct Series {
     folder: PathBuf,
     index: PathBuf,
-    /// The index as it was written last, and where its entries end.
+    /// The index as it was last written, and the position where its entries end.
     open: Option<(File, u64)>,
     name: String,
     times: Vec<f64>,
@@ -107,7 +107,7 @@ impl Series {
         let list =
             pvd_text(all.map(|(index, &time)| (time, self.listed_name(index)))).map_err(io::Error::other)?;
         replace(&self.index, |file| file.write_all(list.as_bytes()))?;
-        // It is listed anew as long as frames of an interrupted run are in it.
+        // The index is written as a whole as long as it lists frames of an interrupted run.
         let file = self.beyond.is_empty().then(|| reopen(&self.index).ok()).flatten();
         Ok(file.map(|file| (file, (list.len() - PVD_TAIL.len()) as u64)))
     }

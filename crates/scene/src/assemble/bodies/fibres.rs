@@ -16,7 +16,7 @@ use crate::assemble::meshes::list_cells;
 
 /// Directions shorter than this are zero.
 const ZERO: f64 = 1e-12;
-/// A direction by a rule is lost where its length is below this part of what it is elsewhere.
+/// A direction by a rule is undefined where its length is below this fraction of its usual length.
 const LOST: f64 = 1e-6;
 
 /// The fault of a rule: the keys below it, the message and what to do.

@@ -277,8 +277,8 @@ impl Meshed<'_> {
         }
     }
 
-    /// Puts the number of a label in place of its name; whether all names are known. Numbers stay as they are
-    /// written.
+    /// Replaces names of labels by their numbers; returns true if all names are known. Numbers keep their
+    /// spelling.
     fn number_keys<T>(&mut self, labels: &Labels, path: &[&str], map: &mut BTreeMap<String, T>) -> bool {
         let mut all = true;
         let mut numbered = BTreeMap::new();

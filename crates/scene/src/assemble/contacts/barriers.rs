@@ -171,7 +171,7 @@ impl Loaded<'_> {
         cells.iter().map(|&cell| self.assembly.facets[cell as usize].thickness).fold(0.0, f64::max)
     }
 
-    /// Refuses what goes with no barrier: a controlled load, and jaws that hold by an ideal grip.
+    /// Refuses features that no barrier supports: a controlled load, and jaws that hold by an ideal grip.
     pub(super) fn check_goes_with_barriers(&mut self, name: &str, contacts: &Contacts) {
         if self.scene.run.control.is_some() {
             let help = "prescribe the load, or move a tool or nodes instead";

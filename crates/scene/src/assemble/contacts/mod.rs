@@ -300,7 +300,7 @@ impl Loaded<'_> {
         true
     }
 
-    /// The bodies of a contact, each with what it touches; every pair once.
+    /// Returns the bodies of a contact, each with its partner; every pair once.
     fn pairs(&mut self, name: &str, table: &ContactTable, rigids: &[Rigid]) -> Option<Vec<(usize, Partner)>> {
         let [first, second] = [0, 1].map(|side| self.partners(name, table, side, rigids));
         let (first, second) = (first?, second?);
@@ -417,7 +417,7 @@ impl Loaded<'_> {
         // Barriers act on tied nodes, which move with others by weights.
         let follows = self.assembly.followers();
         let tied = self.assembly.ties.iter().flat_map(Tie::rows);
-        // Barriers act on what a pressure fills, too.
+        // Barriers act on nodes around a constrained volume, too.
         let binds = |constraint: &&Constraint| {
             let motion = &constraint.motion;
             motion.is_collective() && !(is_barrier && motion.encloses())

@@ -98,7 +98,7 @@ impl Loaded<'_> {
         Some(Shape::Grid(Arc::new(grid)))
     }
 
-    /// Makes them; on failure the key to point at, the message and what to do.
+    /// Makes the distances; on failure returns the key to point at, the message and the remedy.
     fn distances(
         &self,
         mesh: &Mesh,

@@ -107,8 +107,8 @@ impl<'s> InContact<'s> {
         ways.iter().any(|way| *way != Vector3::zeros()).then_some(ways)
     }
 
-    /// The bodies with shapes at rest that have gone these ways [m], and a context to begin anew with. It has
-    /// the remarks on how the bodies were made, and how they were parted: the last one.
+    /// Returns the bodies with shapes at rest moved by these ways [m], and a context for a new start. The
+    /// context keeps the notes on how the bodies were made, and the last note: how they were parted.
     pub(in crate::assemble) fn parted(self, ways: &[Vector3]) -> (Context<'s>, Vec<BuiltBody>) {
         let Tied { meshed, noted, .. } = self.loaded.tied;
         let Meshed { context, assembly, mut bodies, .. } = meshed;
@@ -142,7 +142,7 @@ impl<'s> InContact<'s> {
             deepest: (0.0, Vector3::zeros()),
         };
         let check = IntersectionCheck::new(contacts, &self.assembly.rest);
-        // No barrier begins where an edge goes through a face by less than what explicit runs count.
+        // A barrier cannot begin with an edge through a face, even by less than explicit runs count.
         let check = if self.scene.run.solver.solves_equations() { check.of_all() } else { check };
         let mut crossings = Vec::new();
         for pass in 0..=PASSES {
@@ -231,7 +231,7 @@ impl<'s> InContact<'s> {
         }
     }
 
-    /// Ways [m] of all nodes, where those inside of bodies that do not stay are means of those around.
+    /// Ways [m] of all nodes; inner nodes that do not stay take the mean of their neighbours.
     fn follow_inside(
         &self,
         contacts: &Contacts,

@@ -149,7 +149,8 @@ impl Context<'_> {
         Ok(Scan::Image(image, choice))
     }
 
-    /// The image, with the one that is added to it, or several masks as one; with the names of its labels.
+    /// Reads the image, with the image that is added to it, or several masks as one image; with the names of
+    /// its labels.
     fn read_images(&self, table: &MeshTable, watch: Watch<'_>) -> Result<Image, MeshFault> {
         let failed = |key, error: ImageError| {
             let help = match error {
@@ -199,7 +200,7 @@ impl Context<'_> {
     }
 }
 
-/// The labels that a table requests, as far as the image has them, or the threshold above which voxels are
+/// Chooses the labels that a table requests and the image has, or the threshold above which voxels are
 /// inside.
 fn choice(image: &mut Image, table: &MeshTable) -> Result<Choice, MeshFault> {
     if let (Some(threshold), None) = (table.threshold, &table.masks) {
@@ -589,7 +590,8 @@ impl Recipe {
         surface.fine_anatomy(1, edge, request.finest(), &|done| watch(DONE[2] * done, "finding the shape"))
     }
 
-    /// The body cut out of an image, what its cleaning changed, and the least step of its voxels [m].
+    /// Cuts the body out of an image. Returns it, the changes by cleaning, and the least step of its voxels
+    /// [m].
     fn anatomy(
         &self,
         image: &Image,

@@ -143,7 +143,7 @@ impl Meshed<'_> {
                 "leave one of the two ties out".to_owned()
             }
             TieError::Chain { .. } => {
-                // What follows the guest, or what the host follows.
+                // A body that follows the guest, or a body that the host follows.
                 let chain = ties().find_map(|[a, b]| match () {
                     () if b == guest => Some((a, guest, host)),
                     () if a == host => Some((guest, host, b)),

@@ -15,7 +15,7 @@ use crate::assemble::meshes::{MeshOrigin, surface_of};
 const FAR: f64 = 0.05;
 
 impl Meshed<'_> {
-    /// Warns of what a body carries far outside of itself.
+    /// Warns of something that a body carries far outside of its mesh.
     pub(in crate::assemble) fn doubt_place(
         &mut self,
         what: &str,
