@@ -79,7 +79,7 @@ fn write_crack(folder: &Path) -> Vec<u32> {
 }
 
 /// A wedge that falls into a crack (Erleben 2018) intersects its sides without a contact distance, and does
-/// not with the usual one. Intersections are counted, and end no run.
+/// not with the usual one. Intersections deeper than 1e-4 of the mean edge are counted, and end no run.
 #[test]
 fn intersections_are_counted() {
     let place = tempfile::tempdir().unwrap();
