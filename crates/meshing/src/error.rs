@@ -8,7 +8,7 @@ pub enum MeshingError {
     /// A length or a factor is zero, negative, infinite or NaN.
     #[error("{what} is {value}; it must be positive and finite")]
     NotPositive {
-        /// Which quantity.
+        /// Name of the quantity.
         what: &'static str,
         /// Its value.
         value: f64,
@@ -38,13 +38,13 @@ pub enum MeshingError {
     NoSuchLabel {
         /// The label.
         label: i32,
-        /// Those of the mesh.
+        /// The labels of the mesh.
         labels: Vec<i32>,
     },
     /// A position has an infinite or NaN coordinate.
     #[error("{what} is ({}, {}, {}) m; it must be finite", value.x, value.y, value.z)]
     NotFinite {
-        /// Which position.
+        /// Name of the position.
         what: &'static str,
         /// Its value.
         value: Vector3,
@@ -147,7 +147,7 @@ pub enum MeshingError {
     FieldNotFinite {
         /// Value found.
         value: f64,
-        /// Where [m].
+        /// Place of this value [m].
         point: Vector3,
     },
     /// The body reaches beyond its own box.

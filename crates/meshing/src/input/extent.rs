@@ -52,8 +52,8 @@ pub(crate) fn require_room(
     Ok(())
 }
 
-/// Checks, before anything is made of it, that a body of a volume [m³] filled with tets or hexes of `edge`
-/// [m] stays within the limit on cells.
+/// Checks before meshing that a body of a volume [m³] filled with tets or hexes of `edge` [m] stays within
+/// the limit on cells.
 pub fn require_room_for(
     kind: CellKind,
     edge: f64,

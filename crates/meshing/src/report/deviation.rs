@@ -149,8 +149,8 @@ impl Measured {
 }
 
 impl Deviation {
-    /// Measures a mesh with cells of `edge` [m] against its input: the triangles of a file, the voxel faces
-    /// of an image, or the field of a function. Samples are at most a quarter of an edge apart.
+    /// Measures a mesh with cells of `edge` [m] against its input. The input is the triangles of a file, the
+    /// voxel faces of an image, or the field of a function. Samples are at most a quarter of an edge apart.
     ///
     /// # Errors
     /// If the box of the field is empty or not finite.
@@ -164,7 +164,7 @@ impl Deviation {
     }
 
     /// Measures a mesh against a field. The surface is sampled at its intersections with a grid of a quarter
-    /// of `edge` [m], at least a 160th of the box: thinner parts may be missed.
+    /// of `edge` [m], at least a 160th of the box. Thinner parts may be missed.
     ///
     /// # Errors
     /// If the box of the field is empty or not finite.
@@ -294,7 +294,7 @@ pub(crate) fn sample_step(field: &(impl ImplicitField + ?Sized), edge: f64) -> R
     Ok((edge / SAMPLES_PER_EDGE).max((high - low).amax() / MOST_SAMPLES))
 }
 
-/// Where the zero surface crosses the edges of a grid over a box.
+/// Points where the zero surface crosses the edges of a grid over a box.
 fn crossings(
     field: &(impl ImplicitField + ?Sized),
     low: &Vector3,

@@ -1,9 +1,9 @@
-//! Exchange of shells once there are as many as asked for. Where they are farthest off, they are fitted again
-//! by themselves, edges flip or shells are halved; for each that is halved two others collapse, where they
-//! stay close. Each change is tried on a part of the shells (`part`) and stays if the farthest there come
-//! nearer, or if those that collapse stay nearer than the farthest of all. It ends when the farthest come no
-//! nearer, nothing collapses or the work is done. Leaves out: collapses of points of borders, of sharp edges
-//! and of creases.
+//! Exchange of shells once their requested number is reached. The shells that are farthest off are fitted
+//! again by themselves, edges flip or shells are halved. For each halved shell two others collapse, where
+//! they stay close. Each change is tried on a part of the shells (`part`). It stays if the farthest there
+//! come nearer, or if collapsed shells stay nearer than the farthest of all. The exchange ends when the
+//! farthest come no nearer, nothing collapses or the work is done. Leaves out: collapses of points of
+//! borders, of sharp edges and of creases.
 
 use std::collections::BTreeSet;
 
@@ -14,7 +14,7 @@ use super::target::Target;
 use super::{POOR, Shells, worst};
 use crate::surface::edges::key;
 
-/// Where edges collapse, distances stay below this part of the largest.
+/// Distances stay below this part of the largest where edges collapse.
 const SPARE: f64 = 0.75;
 
 /// Collapses tried in a row at most: those left are farther off, and fail as well.
@@ -27,14 +27,15 @@ const MOST_HALVED: usize = 4;
 const AIM: f64 = 0.8;
 const AIM_HALVED: f64 = 0.6;
 
-/// A change stays if the largest distance falls below this part of it: without more shells, and with some.
+/// A change stays if the largest distance falls below this part of its old value: without more shells, and
+/// with some.
 const NEARER: f64 = 0.95;
 const NEARER_HALVED: f64 = 0.98;
 
 /// Times that triangles are evened out after there are more or fewer.
 const EVENED: usize = 3;
 
-/// What may change in a part. Points and shells have their numbers in it.
+/// Change of a part of the shells. Points and shells have their numbers in the part.
 #[derive(Clone, Copy, Debug)]
 enum Change {
     /// No more than places and normals.
@@ -43,7 +44,7 @@ enum Change {
     Flip([u32; 2]),
     /// A shell is halved at its longest edge.
     Halve(u32),
-    /// Two points become the first of them.
+    /// Two points become the first one.
     Collapse([u32; 2]),
 }
 
@@ -82,8 +83,8 @@ impl Part {
         Some(next)
     }
 
-    /// Whether its triangles are no poorer than those before a change, no more points have lost their normals
-    /// and no more shells cross.
+    /// True if a change has not made triangles poorer, taken the normal of any point, or made more shells
+    /// cross.
     fn holds(&self, before: &Self, effort: &mut Effort) -> bool {
         let crossing = |part: &Self, effort: &mut Effort| {
             part.shells.crossing_with_moving(part.shells.parts_in_the_end(), effort)
@@ -129,8 +130,8 @@ struct Exchange<'t> {
 }
 
 impl Shells {
-    /// Exchanges shells as long as the largest distance falls, if there are as many as asked for. `told`
-    /// hears that distance [m].
+    /// Exchanges shells as long as the largest distance falls, if their requested number is reached. `told`
+    /// hears this distance [m].
     pub(super) fn exchange(
         &mut self,
         number: usize,

@@ -29,8 +29,9 @@ impl Shells {
         }
     }
 
-    /// Makes those shells flat that are farther off than a bound [m], told by the distances of all, and
-    /// nearer as flat triangles, as long as the largest distance falls. Returns whether any are.
+    /// Flattens shells that are farther off than a bound [m] and nearer as flat triangles, as long as the
+    /// largest distance falls. `bound` is computed from the distances of all shells. Returns whether any
+    /// shell was flattened.
     pub(super) fn flatten_nearer(&mut self, target: &Target, bound: impl Fn(&[f64]) -> f64) -> bool {
         let largest = |far: &[f64]| far.iter().copied().fold(0.0, f64::max);
         let flat = Self { flat: vec![true; self.mesh.triangles.len()], ..self.clone() };
@@ -53,7 +54,7 @@ impl Shells {
         is_changed
     }
 
-    /// How far the control points of a shell lie from its triangle at most [m].
+    /// Largest distance of the control points of a shell from its triangle [m].
     fn bulge(&self, shell: u32) -> f64 {
         let patch = self.patch(shell);
         let (start, normal) = (patch.corners()[0], patch.facet_normal());
@@ -61,7 +62,7 @@ impl Shells {
         patch.edge_points().iter().map(off).fold(0.0, f64::max)
     }
 
-    /// Whether a shell is flat.
+    /// True if a shell is flat.
     pub(super) fn is_flat(&self, shell: u32) -> bool {
         self.flat.get(shell as usize).is_some_and(|flat| *flat)
     }

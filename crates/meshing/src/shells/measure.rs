@@ -15,14 +15,14 @@ use crate::surface::triangles::shape;
 /// Parts of an edge of the flat triangles among which the nearest place of the shells is looked for.
 const FACETS: usize = 8;
 
-/// The same with more than so many shells.
+/// Parts of an edge with more than [`MANY`] shells.
 const FEWER_FACETS: usize = 4;
 const MANY: usize = 2000;
 
 /// Steps to the nearest place of a shell from there on.
 const STEPS: usize = 10;
 
-/// Where a point of the target is nearest to the shells.
+/// Place on the shells that is nearest to a point of the target.
 #[derive(Clone, Copy)]
 pub(super) struct Landing {
     pub(super) point: Vector3,
@@ -42,7 +42,7 @@ pub(super) struct Distances {
     there: Vec<f64>,
     /// Parts of an edge between the places of a shell that were looked at.
     parts: usize,
-    /// Of the points of the target, in their order.
+    /// Nearest places of the points of the target, in the order of these points.
     pub(super) landings: Vec<Landing>,
 }
 
@@ -57,8 +57,8 @@ impl Distances {
         far
     }
 
-    /// Those of some shells, increasing, which are numbered anew, and of points of the target that are
-    /// nearest to those that move.
+    /// Returns the distances of some shells, increasing, which are numbered anew, and of the points of the
+    /// target that are nearest to moving shells.
     pub(super) fn part(&self, own: &[u32], moves: impl Fn(u32) -> bool) -> Self {
         let there = own.iter().map(|&t| self.there[t as usize]).collect();
         let landings = self.landings.iter().filter(|landing| moves(landing.shell)).filter_map(|landing| {
@@ -69,8 +69,8 @@ impl Distances {
 }
 
 impl Distances {
-    /// Puts those of a part, whose shells have these numbers here, in the place of those of the shells that
-    /// moved there.
+    /// Replaces the distances of the shells that moved by the distances of a part. `own` holds the numbers of
+    /// the part's shells here.
     pub(super) fn put(&mut self, part: &Self, own: &[u32], moved: impl Fn(u32) -> bool) {
         let count = own.iter().map(|&t| t as usize + 1).fold(self.there.len(), usize::max);
         self.there.resize(count, 0.0);
@@ -94,7 +94,7 @@ impl Shells {
         self.mesh.alive().filter(|&t| self.moves(t)).map(|t| far[t as usize]).fold(0.0, f64::max)
     }
 
-    /// All distances.
+    /// Measures all distances.
     pub(super) fn distances(&self, detail: &Detail, target: &Target) -> Distances {
         let shells: Vec<u32> = self.mesh.alive().collect();
         let mut there = vec![0.0; self.mesh.triangles.len()];
@@ -102,15 +102,15 @@ impl Shells {
         Distances { there, parts: detail.parts, landings: self.landings(shells, detail) }
     }
 
-    /// Where points of the target are nearest to shells.
+    /// Nearest places of the points of the target on some shells.
     fn landings(&self, shells: Vec<u32>, detail: &Detail) -> Vec<Landing> {
         let nearest = Nearest::new(self, shells);
         let spots = detail.samples.par_iter().zip(&detail.normals);
         spots.filter_map(|(sample, normal)| nearest.landing(&sample.point, normal)).collect()
     }
 
-    /// Distances after some shells have moved. Points of the target that were nearest to these are looked for
-    /// on them and their neighbours; others are at most as far off as before.
+    /// Distances after some shells have moved. Points of the target that were nearest to moved shells are
+    /// searched on these shells and their neighbours. All others are at most as far off as before.
     pub(super) fn distances_after(
         &self,
         before: &Distances,
@@ -159,7 +159,7 @@ impl Shells {
         shells.iter().zip(found).for_each(|(&t, off)| there[t as usize] = off);
     }
 
-    /// Measures all and tells what was found.
+    /// Measures everything and reports the findings.
     pub(super) fn finished(
         &self,
         target: &Target,
@@ -282,7 +282,7 @@ struct Picture {
     forward: (f64, f64),
     /// The largest of each shell [m].
     far: Vec<f64>,
-    /// Where it is farthest off [m].
+    /// Place of the largest distance [m].
     farthest: Vector3,
 }
 
@@ -334,8 +334,8 @@ impl Nearest {
         Some(self.refined_from(point, self.locator.closest(point)?))
     }
 
-    /// The same, of what looks the same way as the target. What looks the other way counts if nothing else is
-    /// near, as measured by the size of a shell.
+    /// Returns the nearest place that looks the same way as the target. A place that looks the other way
+    /// counts if nothing else is near, relative to the size of a shell.
     fn landing(&self, point: &Vector3, normal: &Vector3) -> Option<Landing> {
         let (mut shell, mut place, mut off) = self.nearest(point)?;
         let patch = &self.patches[shell];

@@ -1,15 +1,15 @@
 //! A fine surface by few curved shells: cubic Bézier triangles ([`CurvedTriangle`]) whose vertices and
-//! normals are fitted to it. A decimated surface starts; then, round by round, the shells that are too far
-//! off, either way, are halved at their longest edges, and round them triangles are evened out and fitted
-//! again, while the others rest. What is reached is looked at more closely before it counts. Normals stand
+//! normals are fitted to it. The fit starts from a decimated surface. Round by round, shells that are too far
+//! off, either way, are halved at their longest edges. The triangles round them are evened out and fitted
+//! again, while the others rest. Before a goal counts as reached, it is measured more closely. Normals stand
 //! within 60° of their triangles and shells do not pass through each other: where they would, they are
-//! halved, too. As many shells as asked for come nearer by exchange (`exchange`): some collapse where the
-//! surface is flat, and others are halved elsewhere. What crosses in the end is repaired (`repair`), and of
-//! what is left shells become flat (`flatten`). Where a fit fails, it starts again from finer triangles, and
-//! where even flat triangles cross from some that never did (`start`). The work is bounded, by a count that
-//! is the same on every machine; what was closest by then is the result. Sharp edges of the surface stay
-//! (`sharp`). Where flat triangles are nearer than curved ones, they are flat. Leaves out: edges that bend
-//! more than their end normals tell.
+//! halved, too. A requested number of shells comes nearer by exchange (`exchange`): some collapse where the
+//! surface is flat, and others are halved elsewhere. Crossings at the end are repaired (`repair`), and shells
+//! that still cross become flat (`flatten`). Where a fit fails, it starts again from finer triangles. Where
+//! even flat triangles cross, it starts from some that never did (`start`). The work is bounded, by a count
+//! that is the same on every machine; the closest shells by then are the result. Sharp edges of the surface
+//! stay (`sharp`). Where flat triangles are nearer than curved ones, they are flat. Leaves out: edges that
+//! bend more than their end normals show.
 
 mod crossing;
 mod effort;
@@ -67,8 +67,9 @@ const MENDING_ROUNDS: usize = 4;
 /// asked for.
 const LEAST_EDGE: f64 = 1e-3;
 
-/// Part of the work allowed after which a fit is given up that is not [`UPRIGHT_FROM`] of the way and has not
-/// come this much nearer in so many rounds, if there are finer triangles to start from.
+/// Limits after which a fit is given up if there are finer triangles to start from. It has used more than
+/// this part of the work allowed and has not come [`UPRIGHT_FROM`] of the way. Nor has it come nearer by this
+/// factor in this many rounds.
 const GIVEN_UP: f64 = 0.5;
 const NEARER: f64 = 1.05;
 const STUCK: usize = 3;
@@ -77,37 +78,37 @@ const STUCK: usize = 3;
 const AGAIN: f64 = 0.5;
 
 /// Least shape of shells that keep sharp edges. If one is slimmer, shells without sharp edges are fitted,
-/// too, and are the result unless their distance is larger by more than the factor below. Rims of images have
-/// more corners than few shells can follow.
+/// too. They are the result unless their distance is larger by more than the factor below. Rims of images
+/// have more corners than few shells can follow.
 const SLIM: f64 = 0.3;
 const MUCH: f64 = 2.0;
 
 /// Part of the work allowed that is left for the exchange of shells, at least.
 const EXCHANGE: f64 = 0.25;
 
-/// So many shells are fitted once a round, fewer up to four times.
+/// Number of shells that are fitted once a round; fewer are fitted up to four times.
 const MANY: usize = 3000;
 
-/// When the shells are good enough.
+/// Condition that ends a fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ShellGoal {
-    /// When both ways no distance is above this part of the diagonal of the target's box.
+    /// Largest distance, both ways, as a part of the diagonal of the target's box.
     Error(f64),
-    /// At this many shells, or one fewer, as close as the work allowed makes them.
+    /// Number of shells, or one fewer, as close as the work allowed makes them.
     Shells(usize),
 }
 
 /// Curved shells fitted to a surface.
 #[derive(Clone, Debug)]
 pub struct FittedShells {
-    /// Triangles with the unit normals of their nodes as point data `normal` and the largest distance of each
-    /// shell [m], both ways, as cell data `distance`. Where some shells are as flat as their triangles, cell
-    /// data `flat` is 1 there and 0 elsewhere.
+    /// Triangles with their data. Point data `normal` holds the unit normals of the nodes, cell data
+    /// `distance` the largest distance of each shell [m], both ways. Where some shells are as flat as their
+    /// triangles, cell data `flat` is 1 there and 0 elsewhere.
     pub mesh: Mesh,
     /// The curved surface in small flat triangles, with its distance from the target as point data `distance`
     /// [m].
     pub error_map: Mesh,
-    /// What was measured.
+    /// The measurements.
     pub report: ShellReport,
 }
 
@@ -120,18 +121,19 @@ struct Shells {
     on_border: Vec<bool>,
     /// Points that may move: those near what has changed. The others keep what was fitted.
     active: Vec<bool>,
-    /// Whether normals must stand on their triangles. On the way to the goal, while triangles are large, they
+    /// True if normals must stand on their triangles. On the way to the goal, while triangles are large, they
     /// need not: points that are held back then do not find their places.
     strict: bool,
     /// Points where no normal stands on all triangles, and points of sharp edges.
     creased: Vec<bool>,
     /// Points of sharp edges of the target, which stay there.
     sharp: Vec<bool>,
-    /// Shells that are as flat as their triangles, by the numbers of these; empty if there are none.
+    /// True for each shell that is as flat as its triangle, by the numbers of the triangles; empty without
+    /// flat shells.
     flat: Vec<bool>,
 }
 
-/// How far a fit has come.
+/// Progress of a fit.
 #[derive(Clone, Copy, Debug)]
 pub struct FitProgress {
     /// From 0 to 1: of the way to the goal or of the work allowed, whichever is more.
@@ -164,8 +166,8 @@ impl FittedShells {
         Ok(Self::within(target, goal, Effort::new(most), UNCROSSED, progress))
     }
 
-    /// The same with so much work for each of two attempts. In the first, collapses may make more than
-    /// `uncrossed` triangles cross.
+    /// Fits shells with a limit on the work of each of two attempts. In the first attempt, collapses may make
+    /// triangles cross while there are more than `uncrossed`.
     fn within(
         surface: &TriangleMesh,
         goal: ShellGoal,
@@ -237,7 +239,7 @@ impl Found {
     }
 }
 
-/// What is to be fitted, and who hears how far it has come.
+/// Target and goal of a fit, and the listener to its progress.
 #[derive(Clone, Copy)]
 struct Job<'t> {
     target: &'t Target,
@@ -306,7 +308,7 @@ struct Fit<'t> {
     shells: Shells,
     rounds: usize,
     effort: Effort,
-    /// Whether distances are looked at closely.
+    /// True if distances are measured closely.
     closely: bool,
     best: Option<(Rank, Shells)>,
     /// The largest part of the goal so far, and the round that reached it.
@@ -314,11 +316,11 @@ struct Fit<'t> {
     /// Rounds that are left once the goal is reached, and those to mend shells in.
     left: usize,
     mending: usize,
-    /// Whether nothing else is tried if it fails.
+    /// True if nothing else is tried after a failure.
     is_last: bool,
 }
 
-/// How a fit ends.
+/// Reason for the end of a fit.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum End {
     /// More rounds do not help.
@@ -329,8 +331,8 @@ enum End {
     Spent,
 }
 
-/// How good shells are; the least is best. Whether the goal is missed, how many shells cross or have creases,
-/// whether triangles are poor, and what is to be small.
+/// Rank of shells; the least is best. True if the goal is missed, number of shells that cross or have
+/// creases, true if triangles are poor, and the quantity to minimise.
 type Rank = (bool, usize, bool, f64);
 
 impl<'t> Fit<'t> {
@@ -405,7 +407,8 @@ impl<'t> Fit<'t> {
         self.end(End::Spent, progress)
     }
 
-    /// Whether it is given up, since it comes no nearer; takes note of the part of the goal that is reached.
+    /// True if the fit is to be given up because it comes no nearer. Records the part of the goal that is
+    /// reached.
     fn is_stuck(&mut self, part: f64) -> bool {
         if part > NEARER * self.nearest.0 {
             self.nearest = (part, self.rounds);
@@ -437,8 +440,8 @@ impl<'t> Fit<'t> {
         Some(now)
     }
 
-    /// Keeps the shells if they are the best so far. Those to be halved for what is wrong with them; `None`
-    /// where no round helps any more.
+    /// Keeps the shells if they are the best so far. Returns the shells to be halved because of a flaw;
+    /// `None` if no further round helps.
     fn flawed(&mut self, far: &[f64], part: f64) -> Option<Vec<u32>> {
         let [creased, crossing] = if self.shells.strict { self.flaws() } else { Default::default() };
         let rank = self.rank(far, part, creased.len() + crossing.len());
@@ -454,7 +457,7 @@ impl<'t> Fit<'t> {
             return Some(flawed);
         }
         let mends = !flawed.is_empty() && self.mending > 0;
-        // As many as asked for come nearer by exchange.
+        // A requested number of shells comes nearer by exchange.
         let is_near = match self.goal {
             ShellGoal::Error(_) => !rank.2 && rank.3 <= self.aim,
             ShellGoal::Shells(_) => true,
@@ -489,7 +492,8 @@ impl<'t> Fit<'t> {
         (Found { shells, fitted }, self.effort)
     }
 
-    /// How much of the goal is reached, the distance above which shells are halved [m], and how many may be.
+    /// Part of the goal that is reached, distance above which shells are halved [m], and number of shells
+    /// that may be halved.
     fn bounds(&self, far: &[f64]) -> (f64, f64, usize) {
         let count = self.shells.mesh.len();
         match self.goal {
@@ -526,7 +530,7 @@ impl<'t> Fit<'t> {
         [mesh.alive().filter(creased).collect(), self.shells.crossing().shells()]
     }
 
-    /// Whether halving a shell may mend it.
+    /// True if halving a shell may mend it.
     fn is_long(&self, shell: u32) -> bool {
         let x = self.shells.mesh.corners(shell);
         let longest = (0..3).map(|k| (x[(k + 1) % 3] - x[k]).norm()).fold(0.0, f64::max);
@@ -538,8 +542,8 @@ fn worst(far: &[f64]) -> f64 {
     far.iter().copied().fold(0.0, f64::max)
 }
 
-/// The distance above which shells are halved on the way to a number of them: six tenths of the worst, or so
-/// many that there are a twentieth more.
+/// The distance above which shells are halved on the way to a requested number. It is six tenths of the
+/// worst, or less if that halves fewer than a twentieth of the shells.
 fn share(far: &[f64]) -> f64 {
     let mut sorted = far.to_vec();
     sorted.sort_unstable_by(|a, b| b.total_cmp(a));
@@ -618,7 +622,7 @@ impl Shells {
         CurvedTriangle::new(self.mesh.corners(triangle), [a, b, c], [ab, ba, bc, cb, ca, ac], EdgeRule::Arc)
     }
 
-    /// Whether a corner of a shell may move, or the shell is gone.
+    /// True if a corner of a shell may move, or the shell is gone.
     fn moves(&self, shell: u32) -> bool {
         !self.mesh.exists(shell)
             || self.mesh.triangles[shell as usize].iter().any(|&n| self.active[n as usize])

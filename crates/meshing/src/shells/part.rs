@@ -1,10 +1,10 @@
-//! Some shells cut out of the whole. A change of a few points is tried on what is near them only, so it costs
-//! no more on a large organ.
+//! Some shells cut out of the whole. A change of a few points is tried on their surroundings only, so it
+//! costs no more on a large organ.
 
 use super::Shells;
 use super::measure::Distances;
 
-/// The shells that some points may change, and what is near.
+/// The shells that some points may change, and their surroundings.
 #[derive(Clone)]
 pub(super) struct Part {
     pub(super) shells: Shells,

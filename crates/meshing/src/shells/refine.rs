@@ -55,7 +55,7 @@ impl Shells {
         around.iter().map(|&n| (self.mesh.points[n as usize] - here).norm()).fold(f64::INFINITY, f64::min)
     }
 
-    /// Puts the points of borders on those of the target. Decimation leaves them beside it, and neither
+    /// Puts the points of borders on the borders of the target. Decimation leaves them near, and neither
     /// evening out nor the fit need move them.
     pub(super) fn place_border(&mut self, target: &Target) {
         for point in 0..self.mesh.points.len() as u32 {
@@ -101,7 +101,7 @@ impl Shells {
         nodes.map(|n| self.mesh.points[n as usize])
     }
 
-    /// The least cosine between the normal of a triangle and those of its corners.
+    /// The least cosine between the normal of a triangle and the normals of its corners.
     fn stands(&self, nodes: [u32; 3], x: [Vector3; 3]) -> f64 {
         self.along(nodes, &cross(x).try_normalize(0.0).unwrap_or_default())
     }
@@ -135,8 +135,8 @@ impl Shells {
         self.mesh.star[point as usize].iter().map(of).fold(f64::INFINITY, f64::min)
     }
 
-    /// Moves a point towards evener triangles, as long as no triangle there gets worse than the worst, and
-    /// where they are poor to the best of some places around.
+    /// Moves a point towards evener triangles, as long as no triangle there gets worse than the worst. Where
+    /// triangles are poor, it moves to the best of some places around.
     fn move_along(&mut self, point: u32, target: &Target) {
         let here = self.mesh.points[point as usize];
         if let [a, b] = self.mesh.marked(point)[..]
@@ -180,7 +180,7 @@ impl Shells {
         }
     }
 
-    /// Whether flat triangles round a point cross any.
+    /// True if flat triangles round a point cross any.
     fn is_crossed_round(&self, point: u32) -> bool {
         let star = &self.mesh.star[point as usize];
         let nodes: Vec<[u32; 3]> = star.iter().map(|&t| self.mesh.triangles[t as usize]).collect();
@@ -254,7 +254,7 @@ impl Shells {
         fresh
     }
 
-    /// Whether an edge may collapse into its first end: the second is on no border, sharp edge or crease.
+    /// True if an edge may collapse into its first end: the second is on no border, sharp edge or crease.
     pub(super) fn may_collapse(&self, [keep, gone]: [u32; 2]) -> bool {
         !self.on_border[gone as usize] && !self.creased[gone as usize] && self.mesh.may_collapse(keep, gone)
     }

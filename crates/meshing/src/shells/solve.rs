@@ -46,7 +46,7 @@ impl ShellBlock {
         block
     }
 
-    /// Where the unknowns of its corners stand among all.
+    /// Indices of the unknowns of its corners among all unknowns.
     fn places(&self) -> [usize; 3] {
         self.nodes.map(|node| UNKNOWNS * node as usize)
     }

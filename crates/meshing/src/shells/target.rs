@@ -1,6 +1,6 @@
-//! The surface to be fitted, and the points of it that are looked at. Where a surface folds, its other side
-//! may be nearer than the side that a shell stands for: what looks the other way is passed over, as far as
-//! the shell is large.
+//! The surface to be fitted, and its sampled points. Where a surface folds, its other side may be nearer than
+//! the side that a shell stands for. Points that look the other way are passed over within the size of the
+//! shell.
 
 use std::collections::BTreeMap;
 
@@ -15,7 +15,7 @@ use crate::surface::triangles::TriangleMesh;
 const MOST_COARSE: usize = 20_000;
 const MOST_FINE: usize = 80_000;
 
-/// What has a normal with a smaller cosine to a shell's looks the other way.
+/// Cosine between two normals below which a surface looks the other way from a shell.
 pub(super) const FACING: f64 = -0.3;
 
 /// The surface to be fitted.
@@ -28,7 +28,7 @@ pub(super) struct Target {
     pub(super) diagonal: f64,
 }
 
-/// How closely distances are looked at.
+/// Resolution at which distances are measured.
 pub(super) struct Detail {
     /// Points of the target.
     pub(super) samples: Vec<Sample>,
@@ -55,8 +55,8 @@ impl Target {
         Self { coarse, fine, diagonal, reference }
     }
 
-    /// The nearest point that looks the same way as `facing`, and the normal there. One that looks the other
-    /// way counts if there is none that is farther off by less than `reach` [m].
+    /// Returns the nearest point that looks the same way as `facing`, and the normal there. The nearest point
+    /// of all counts, even if it looks the other way, unless such a point is within `reach` [m] beyond it.
     pub(super) fn foot(&self, x: &Vector3, facing: &Vector3, reach: f64) -> (Vector3, Vector3) {
         let nearest = self.reference.closest(x);
         if nearest.1.dot(facing) < FACING {

@@ -1,4 +1,4 @@
-//! What ends a fit and what a second one mends, on made-up surfaces.
+//! Tests of the ends of fits and of second fits, on synthetic surfaces.
 
 use super::*;
 use crate::{DEFAULT_CELL_LIMIT, Ellipsoid, ImplicitField, sphere};
@@ -46,8 +46,8 @@ fn surface(field: &dyn ImplicitField, edge: f64) -> TriangleMesh {
     TriangleMesh::of_field(field, edge, DEFAULT_CELL_LIMIT).unwrap()
 }
 
-/// What is found with so much work, from collapses that are looked at from so many triangles down, and the
-/// rounds that were told.
+/// Returns the shells that a limited amount of work finds, and the rounds that were reported. Collapses are
+/// checked for crossings from `uncrossed` triangles down.
 fn found(mesh: &TriangleMesh, goal: ShellGoal, most: usize, uncrossed: usize) -> (FittedShells, usize) {
     let rounds = std::cell::Cell::new(0);
     let told = |progress: FitProgress| {
@@ -57,8 +57,8 @@ fn found(mesh: &TriangleMesh, goal: ShellGoal, most: usize, uncrossed: usize) ->
     (FittedShells::within(mesh, goal, Effort::new(most), uncrossed, &told), rounds.get())
 }
 
-/// A ball with a cavity, whose wall of 0.05 is thinner than few flat triangles are off it: decimated without
-/// a look at crossings they cross, so that all is done again with it.
+/// A ball with a cavity, whose wall of 0.05 is thinner than the error of few flat triangles. Decimated
+/// without a check for crossings, they cross, so the fit is repeated with that check.
 #[test]
 fn shells_whose_triangles_cross_are_fitted_again_from_some_that_never_did() {
     let mut ball = sphere(1.0, 3, DEFAULT_CELL_LIMIT).unwrap();

@@ -1,7 +1,7 @@
 //! Fewer triangles for the same surface: edges collapse in the order of their cost. The cost is the sum of
-//! squared distances from the surrounding planes (Garland and Heckbert 1997), each weighted by its area, with
-//! planes through borders and creases to preserve these. A collapse must keep the topology, the orientation
-//! of faces and some of their shape.
+//! squared distances from the surrounding planes, each weighted by its area (Garland and Heckbert 1997).
+//! Planes through borders and creases preserve these. A collapse must keep the topology, the orientation of
+//! faces and some of their shape.
 
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
@@ -26,7 +26,7 @@ const LEAST_SHAPE: f64 = 0.1;
 /// Triangles are put in again where as many times their number were put in.
 const PUT_IN: usize = 4;
 
-/// When to stop.
+/// Condition to stop at.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fewer {
     /// At this many triangles.
@@ -106,11 +106,11 @@ impl Ord for Candidate {
 
 struct Decimation<'m> {
     mesh: &'m mut TriangleMesh,
-    /// Of planes, and of own places.
+    /// Quadrics of the planes, and of the points' own places.
     quadrics: Vec<[Quadric; 2]>,
     changes: Vec<u32>,
     queue: BinaryHeap<Reverse<Candidate>>,
-    /// Where the triangles are or were, if the surface is kept from crossing itself.
+    /// Present and past places of the triangles, if the surface is kept from crossing itself.
     placed: Option<Boxes>,
     /// Origin of the points, so that sums of squares keep their digits [m].
     origin: Vector3,
@@ -247,7 +247,7 @@ impl<'m> Decimation<'m> {
         count
     }
 
-    /// Where all triangles are.
+    /// Places of all triangles.
     fn places(&self) -> Boxes {
         let count = self.mesh.len().max(1) as f64;
         let area: f64 = self.mesh.alive().map(|t| self.mesh.area(t)).sum();
@@ -276,7 +276,7 @@ impl<'m> Decimation<'m> {
         self.placed = Some(placed);
     }
 
-    /// Whether triangles cross after a collapse where none did before, if that counts.
+    /// True if triangles cross after a collapse where none did before. Always false if crossings are allowed.
     fn makes_cross(&mut self, keep: u32, gone: u32, position: Vector3) -> bool {
         let Some(placed) = &self.placed else { return false };
         let mut old: Vec<u32> =
@@ -318,8 +318,8 @@ mod tests {
         assert!(apart.largest_forward < 0.015 && apart.largest_backward < 0.015, "{apart:?}");
     }
 
-    /// A ball with a cavity, whose wall is thinner than flat triangles of the last size are off it: the faces
-    /// of the wall do not cross.
+    /// A ball with a cavity, whose wall is thinner than the error of the last flat triangles. The faces of
+    /// the wall do not cross.
     #[test]
     fn the_faces_of_a_thin_wall_do_not_cross() {
         let mut ball = sphere(1.0, 4, DEFAULT_CELL_LIMIT).unwrap();

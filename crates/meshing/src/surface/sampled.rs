@@ -14,7 +14,7 @@ use crate::surface::triangles::TriangleMesh;
 use crate::surface::winding::Winding;
 use crate::{DEFAULT_CELL_LIMIT, Fewer};
 
-/// Every so many points along each axis have an exact distance also far from the surface.
+/// Spacing, in points along each axis, of the points that have an exact distance also far from the surface.
 const COARSE: usize = 4;
 
 /// Points of the grid on each side of the moved surface with exact distances, at least.
@@ -180,8 +180,8 @@ mod tests {
         beyond.map(|x| x.max(0.0)).norm() + beyond.max().min(0.0)
     }
 
-    /// Of a box: exact where they are small, with the right sign everywhere, elsewhere off by less than the
-    /// coarse points are apart.
+    /// Distances to a box: exact where they are small, with the right sign everywhere. Elsewhere they are off
+    /// by less than the spacing of the coarse points.
     #[test]
     fn distances_to_a_box_are_those_of_geometry() {
         let size = [0.05, 0.03, 0.02];

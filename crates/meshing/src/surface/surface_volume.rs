@@ -1,7 +1,7 @@
 //! Surfaces of segmented bodies that keep their volume. Facets between points of a curved surface cut it off,
 //! and smoothing takes thin parts away: a ball of few triangles has lost a fifth. All points move along their
-//! normals until the surface encloses the volume of the input, less the parts that it lacks altogether. What
-//! is left is reported.
+//! normals until the surface encloses the volume of the input, less the parts that it lacks altogether. The
+//! remaining error is reported.
 
 use pliant_geometry::Vector3;
 use serde::Serialize;
@@ -18,7 +18,7 @@ use crate::tets::organ::LostReport;
 const STEPS: usize = 6;
 const ENOUGH: f64 = 1e-4;
 
-/// How far points may move in all, in mean edges.
+/// Largest total move of the points, in mean edges.
 const MOST: f64 = 0.25;
 
 /// One label of a surface.
@@ -40,7 +40,7 @@ pub struct SurfaceVolume {
     pub labels: Vec<LabelVolume>,
     /// Parts of the labels that the surface lacks, the largest first.
     pub lost: Vec<LostReport>,
-    /// How far points moved outwards to keep the volume [m].
+    /// Distance that points moved outwards to keep the volume [m].
     pub moved: f64,
 }
 
@@ -140,7 +140,7 @@ impl TriangleMesh {
         signed_volume(&points, &triangles)
     }
 
-    /// A sentence on how its volume differs from that of the surface it was made of, if by more than 5 %;
+    /// Describes how much its volume differs from the volume of the input surface, if by more than 5 %;
     /// `None` for open surfaces.
     pub fn volume_warning(&self, input: &Self) -> Option<String> {
         let error = self.volume() / input.volume() - 1.0;

@@ -28,7 +28,7 @@ pub struct Thickness {
 }
 
 impl TriangleMesh {
-    /// Whether each edge has two triangles.
+    /// True if each edge has two triangles.
     pub fn is_closed(&self) -> bool {
         self.edges().iter().all(|&[a, b]| !self.is_border(a, b))
     }
@@ -123,7 +123,7 @@ impl Ray {
 }
 
 impl SelectionFunction<Face> for Ray {
-    /// Whether the ray meets a box (Kay and Kajiya 1986).
+    /// True if the ray meets a box (Kay and Kajiya 1986).
     fn should_unpack_parent(&self, envelope: &AABB<[f64; 3]>) -> bool {
         let (low, high) = (envelope.lower(), envelope.upper());
         let (mut from, mut to) = (0.0_f64, f64::INFINITY);

@@ -29,7 +29,7 @@ const GAP: f64 = 0.1;
 /// constants.
 const FAR: f64 = 0.25;
 
-/// Where a surface crosses an edge.
+/// Crossing of a surface and an edge.
 struct EdgeCrossing {
     edge: [u32; 2],
     /// Fraction of the way from the first end.

@@ -11,7 +11,7 @@ const LONGEST_RING: usize = 8;
 /// A flip must lengthen the worst tet by this factor.
 const GAIN: f64 = 1.0 + 1e-3;
 
-/// Tells whether an edge of the boundary may turn, given its nodes and those of the new one.
+/// Returns true if an edge of the boundary may turn, given its nodes and the nodes of the new edge.
 pub(crate) type Follows<'a> = dyn Fn(&Complex, [u32; 2], [u32; 2]) -> bool + 'a;
 
 impl Complex {
@@ -168,7 +168,7 @@ impl Complex {
 /// The nodes round an edge.
 struct Ring {
     nodes: Vec<u32>,
-    /// Whether the edge lies on the boundary.
+    /// True if the edge lies on the boundary.
     open: bool,
 }
 

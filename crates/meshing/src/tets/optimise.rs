@@ -31,7 +31,7 @@ const SHRINK: f64 = 0.6;
 /// First trial moves, in lattice constants.
 const REACH: f64 = 0.15;
 
-/// How far surfaces may be shifted, in lattice constants.
+/// Largest shift of surfaces, in lattice constants.
 const LARGEST_SHIFT: f64 = 0.25;
 
 /// Sweeps that slide points to follow a surface, and their first moves in lattice constants.
@@ -41,14 +41,15 @@ const FIT_REACH: f64 = 0.25;
 /// Faces that follow their surface this well (root mean square, in lattice constants) stay.
 const FIT_ENOUGH: f64 = 0.01;
 
-/// If the target is not reached, points around bad tets may leave their surfaces by this, in lattice
-/// constants; the last value applies only if the target itself is not reached.
+/// Distances, in lattice constants, by which points around bad tets may leave their surfaces. They apply in
+/// turn while the aim, a little above the target, is not reached. The last applies only if the target itself
+/// is not reached.
 const SLACKS: [f64; 3] = [0.03, 0.06, 0.12];
 
 /// Boundary edges may flip if the new one is at most this far from the surface, in lattice constants.
 const FLIP_OFF: f64 = 0.03;
 
-/// Inner points are moved at last where their worst tet is below this, in ideal acoustic lengths: it raised τ
+/// Worst tet, in ideal acoustic lengths, below which inner points are moved at the end. These moves raised τ
 /// of the liver phantom at 10 mm from 0.63 to 0.66 on average.
 const POLISH: f64 = 0.9;
 
@@ -78,7 +79,7 @@ pub(crate) struct Optimiser<'a> {
     surfaces: Surfaces<'a>,
     /// Tolerated distance of a point from the sides it lies between, in lattice constants.
     slack: f64,
-    /// Whether points where three materials meet, or two and the outside, only keep to the outside.
+    /// True if points where three materials meet, or two and the outside, only keep to the outside.
     lines_are_free: bool,
     /// Rejects what would let the boundary intersect itself, if it is there.
     guard: Option<Guard>,
@@ -92,7 +93,7 @@ impl<'a> Optimiser<'a> {
         Self { complex, surfaces, slack, lines_are_free, guard, noise: 1, done }
     }
 
-    /// Whether a point may move to `place`.
+    /// True if a point may move to `place`.
     fn lets_move(&self, node: u32, place: &Vector3) -> bool {
         self.guard.as_ref().is_none_or(|guard| guard.lets_move(self.complex, node, place))
     }
@@ -109,9 +110,9 @@ impl<'a> Optimiser<'a> {
         }
     }
 
-    /// Up to `rounds` rounds towards a least acoustic length of `target` × ideal, then surfaces shifted until
-    /// the mesh encloses the volumes [m³] of the whole and of the inner materials, as far as these are known;
-    /// `volumes` gives them for the mesh before.
+    /// Runs up to `rounds` rounds towards a least acoustic length of `target` × ideal. Then it shifts
+    /// surfaces until the mesh encloses the volumes [m³] of the whole and of the inner materials, as far as
+    /// these are known. `volumes` gives them for the mesh before the shifts.
     pub(crate) fn run(
         &mut self,
         target: f64,
@@ -216,7 +217,7 @@ impl<'a> Optimiser<'a> {
         }
     }
 
-    /// Acoustic length of each tet as a part of the ideal; infinite where there is none any more.
+    /// Acoustic length of each tet as a part of the ideal; infinite for removed tets.
     fn parts(&self) -> Vec<f64> {
         let part = |tet: u32| if self.complex.is_alive(tet) { self.complex.part(tet) } else { f64::INFINITY };
         (0..self.complex.tets.len() as u32).into_par_iter().map(part).collect()
@@ -237,8 +238,8 @@ impl<'a> Optimiser<'a> {
         bad.into_iter().map(|(_, tet)| tet).collect()
     }
 
-    /// Removes tets of the boundary that the body does not need to hang together: those below half the
-    /// threshold, and tips that are light for their stiffness.
+    /// Removes tets of the boundary that the body does not need to stay connected. These are tets below half
+    /// the threshold, and tips that are light for their stiffness.
     fn peel(&mut self, threshold: f64) {
         let mut peeled = 0;
         let short = |node: &u32| self.nodal_part(*node, &self.complex.points[*node as usize]) < threshold;
@@ -385,7 +386,7 @@ impl<'a> Optimiser<'a> {
         false
     }
 
-    /// Where the joined point would be best, if that is better than before.
+    /// Best place of the joined point, if that is better than before.
     fn best_collapse(&self, gone: u32, kept: u32, threshold: f64) -> Option<Vector3> {
         let [own, other] = [gone, kept].map(|node| self.complex.sides[node as usize]);
         if own & !other != 0 {
@@ -428,8 +429,8 @@ impl<'a> Optimiser<'a> {
         self.complex.nodal_length(node, place) / self.complex.ideal([node; 4])
     }
 
-    /// Least acoustic length of the tets round a node if it were at `place` as a part of the ideal, leaving
-    /// out those with another node; stops once it is not above `floor`.
+    /// Least acoustic length of the tets round a node if it were at `place`, as a part of the ideal. Tets
+    /// with the node `without` are left out. The search stops once the length is not above `floor`.
     fn star_min(&self, node: u32, place: &Vector3, without: u32, floor: f64) -> f64 {
         let mut least = f64::INFINITY;
         for &tet in &self.complex.star[node as usize] {
@@ -446,13 +447,14 @@ impl<'a> Optimiser<'a> {
         least
     }
 
-    /// The position nearest to `place` between the sides of a node, if it is on the same side of the body:
-    /// the normals differ by less than 90°. The other side of a gap or of a thin lobe may be nearer.
+    /// The position nearest to `place` between the sides of a node, if it is on the same side of the body. On
+    /// that side the normals differ by less than 90°. The other side of a gap or of a thin lobe may be
+    /// nearer.
     fn project(&self, node: u32, place: Vector3) -> Option<Vector3> {
         self.project_from(node, place, &OnceCell::new())
     }
 
-    /// The same; `look` is the normal at the node, found once for several places.
+    /// Projects like [`Self::project`]; `look` is the normal at the node, found once for several places.
     fn project_from(&self, node: u32, place: Vector3, look: &OnceCell<Vector3>) -> Option<Vector3> {
         let mut sides = self.complex.sides[node as usize];
         if self.lines_are_free && sides.count_ones() > 2 {
@@ -522,8 +524,9 @@ impl<'a> Optimiser<'a> {
         }
     }
 
-    /// Sum of area × mean squared distance from the surface over the faces round a node if it were at `place`
-    /// [m⁴], taken at the middle of each face and of its edges at the node; and the area [m²].
+    /// Misfit of the faces round a node if it were at `place`: sum of area × mean squared distance from the
+    /// surface [m⁴]. The mean is over the middle of each face and of its edges at the node. Also returns the
+    /// area [m²].
     fn misfit(&self, node: u32, place: &Vector3, faces: &[[u32; 3]]) -> [f64; 2] {
         let sides = self.complex.sides[node as usize];
         let of_face = |face: &[u32; 3]| {
@@ -555,7 +558,7 @@ impl<'a> Optimiser<'a> {
         }
     }
 
-    /// Moves a point; `parts` are those of all tets, before and after.
+    /// Moves a point; `parts` are the acoustic lengths of all tets over the ideal, before and after.
     fn relocate_one(&mut self, node: u32, now: f64, reach: f64, parts: &mut [f64]) {
         let here = self.complex.points[node as usize];
         let neighbours = self.complex.neighbours(node);

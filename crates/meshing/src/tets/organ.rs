@@ -1,7 +1,7 @@
-//! From an anatomy to tetrahedra that an explicit solver can take large steps with: isosurface stuffing of
-//! the whole body, its materials cut out, banks that touch parted, then the optimiser. Rules and thresholds:
-//! the project's meshing specification 1.3. Cells of several sizes, and cells made smaller until a distance
-//! is held: `grading.rs`.
+//! From an anatomy to tetrahedra that allow an explicit solver large steps. The whole body is filled by
+//! isosurface stuffing, its materials are cut out, banks that touch are parted, then the optimiser runs.
+//! Rules and thresholds: the project's meshing specification 1.3. Cells of several sizes, and cells made
+//! smaller until a distance is held: `grading.rs`.
 
 use std::fmt;
 
@@ -231,9 +231,9 @@ impl OrganTets {
         Ok(OrganMesh { mesh, report })
     }
 
-    /// Halves long edges and optimises; how many were halved, and the steps. Few bodies have banks that could
-    /// meet, and guarding all moves takes long: it is done where the body touched itself (`is_tight`), or
-    /// where the result intersects itself without.
+    /// Halves long edges and optimises. Returns the number of halved edges, and the steps. Few bodies have
+    /// banks that could meet, and guarding all moves takes long. Moves are guarded where the body touched
+    /// itself (`is_tight`), or where the result intersects itself without a guard.
     fn improved(
         &self,
         mut complex: Complex,
@@ -422,7 +422,7 @@ struct OfComplex {
 /// A part of a body that its mesh lacks: thinner than the cells, torn off, or too small.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LostReport {
-    /// Label of most of it.
+    /// Label of the largest share of its volume.
     pub label: i32,
     /// Its volume [m³].
     pub volume: f64,
@@ -431,7 +431,7 @@ pub struct LostReport {
 }
 
 impl LostReport {
-    /// Of the parts of labels that are not negligible in a body of a volume [m³].
+    /// Names the lost parts that are not negligible in a body of a volume [m³].
     pub(crate) fn of(parts: Vec<LostPart>, labels: &[i32], whole: f64) -> Vec<Self> {
         let named = |part: LostPart| {
             let most = (0..part.volumes.len()).max_by(|&a, &b| part.volumes[a].total_cmp(&part.volumes[b]));
@@ -461,9 +461,9 @@ impl LostReport {
 /// Thin parts of a body that a mesh tears.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Tears {
-    /// How many.
+    /// Number of tears.
     pub number: usize,
-    /// Where the first is [m].
+    /// Place of the first [m].
     pub first: Option<[f64; 3]>,
 }
 
@@ -474,7 +474,7 @@ pub struct DistanceReport {
     pub asked: f64,
     /// Largest distance both ways [m].
     pub reached: f64,
-    /// How often cells were made until then.
+    /// Number of times that cells were made.
     pub passes: usize,
     /// The reference of the distance.
     pub to: MeasuredTo,
@@ -524,9 +524,9 @@ pub struct TetReport {
     pub materials: Vec<MaterialReport>,
     /// Least acoustic length [m]: a step of this over the speed of pressure waves is stable.
     pub acoustic_length: f64,
-    /// The smallest one over that of the local ideal tet.
+    /// The smallest acoustic length of a tet over the local ideal.
     pub acoustic_part: f64,
-    /// That part before the optimiser.
+    /// Smallest acoustic length before the optimiser, over the local ideal.
     pub raw_acoustic_part: f64,
     /// Median acoustic length [m].
     pub median_acoustic_length: f64,
@@ -698,7 +698,7 @@ impl TetReport {
         )
     }
 
-    /// The lines of what is not as in the body.
+    /// Writes the lines on differences from the body.
     fn write_flaws(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(lost) = LostReport::in_words(&self.lost) {
             writeln!(f, "lost             {lost}")?;

@@ -31,18 +31,18 @@ const SAMPLES: u32 = 20;
 pub(crate) struct Tear {
     /// Centres of the faces round it [m], and points of the body between them.
     pub(crate) places: Vec<Vector3>,
-    /// How thick the part is there [m].
+    /// Thickness of the part there [m].
     pub(crate) thickness: f64,
 }
 
 /// Faces that cut through the body.
 struct Band {
-    /// Centres of the faces [m], and of all of them.
+    /// Centres of the faces [m], and their mean.
     centres: Vec<Vector3>,
     middle: Vector3,
     /// Sum of their outward normals by area [m²].
     towards: Vector3,
-    /// Whether it looks into a hole that it goes round, or into a void that touches a side of the part in an
+    /// True if it looks into a hole that it goes round, or into a void that touches a side of the part in an
     /// edge.
     is_round: bool,
     thickness: f64,
@@ -123,7 +123,7 @@ impl Band {
     }
 }
 
-/// Whether a mesh holds one of some points.
+/// True if a mesh holds one of some points.
 fn holds_any(complex: &Complex, points: &[Vector3]) -> bool {
     let start = [points[0]; 2];
     let [low, high] = points.iter().fold(start, widened);

@@ -1,7 +1,7 @@
-//! Cubes in the body of a field, on a regular grid, the largest face-connected part: every cube with its
-//! centre inside, or every cube that the body fills by more than a small fraction, with this fraction.
-//! Immersed cubes are weighted by their fractions and carry the surface of the body (de Visser and Comas
-//! 2008).
+//! Cubes in the body of a field, on a regular grid; only the largest face-connected part is kept. Either
+//! every cube with its centre inside counts, or every cube that the body fills by more than a small fraction.
+//! The second kind has this fraction as data. Immersed cubes are weighted by their fractions and carry the
+//! surface of the body (de Visser and Comas 2008).
 
 use pliant_geometry::{CellKind, DataArray, Vector3};
 use rayon::prelude::*;
@@ -43,7 +43,7 @@ impl Voxels {
         Ok(mesh)
     }
 
-    /// The cubes of the same grid that the body fills by more than 2 %, with the fraction as cell data
+    /// Returns the cubes of the same grid that the body fills by more than 2 %. The fraction is cell data
     /// [`Self::FRACTION`], from 512 samples in each cube near the surface.
     pub fn immersed(&self, field: &(impl ImplicitField + ?Sized)) -> Result<FieldMesh, MeshingError> {
         let (mut made, fractions) =
