@@ -56,7 +56,7 @@ impl Scalar {
         !matches!(self, Self::F32 | Self::F64)
     }
 
-    /// All numbers in `bytes` as floating point.
+    /// Decodes `bytes` as floating point numbers.
     pub fn decode(self, bytes: &[u8], order: Order) -> Vec<f64> {
         match self {
             Self::I8 => decode!(bytes, order, i8, f64),
@@ -72,7 +72,7 @@ impl Scalar {
         }
     }
 
-    /// All numbers in `bytes` as integers; floating point numbers are cut towards zero.
+    /// Decodes `bytes` as integers; floating point numbers are cut towards zero.
     pub(crate) fn decode_integers(self, bytes: &[u8], order: Order) -> Vec<i64> {
         match self {
             Self::I8 => decode!(bytes, order, i8, i64),
@@ -137,7 +137,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// Checks that `count` items of at least `each` bytes fit into the rest (the last one without its
-    /// separator); otherwise returns an error, so nothing is allocated for missing items.
+    /// separator). Otherwise returns an error, so nothing is allocated for missing items.
     pub fn room(&self, count: usize, each: usize, reading: impl Display) -> Result<(), Fault> {
         match count.checked_mul(each) {
             Some(needed) if needed <= self.rest().len() + 1 => Ok(()),

@@ -56,7 +56,7 @@ fn unsupported(number: i64) -> (String, usize) {
 #[derive(Default)]
 pub(super) struct Connectivity {
     pub nodes: Vec<i64>,
-    /// Where each cell ends in `nodes`.
+    /// End of each cell in `nodes`.
     pub ends: Vec<i64>,
 }
 

@@ -22,7 +22,7 @@ const MOST_INFLATION: usize = 1040;
 
 /// Properties of all arrays of the file.
 struct Storage<'a> {
-    /// Where the lines of the XML end.
+    /// Ends of the lines of the XML.
     line_ends: Vec<usize>,
     order: Order,
     header: Scalar,
@@ -530,7 +530,7 @@ impl<'a> Storage<'a> {
         Ok(Cow::Owned(inflated))
     }
 
-    /// The same in base64, where the header of compressed blocks is a separate piece.
+    /// Decodes an array in base64, where the header of compressed blocks is a separate piece.
     fn decode_base64(&mut self, text: &[u8], place: Place, what: &str) -> Result<Bytes<'a>, Fault> {
         let size = self.header.size();
         let mut text = Base64::new(text);
