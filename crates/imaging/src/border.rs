@@ -35,7 +35,7 @@ impl Border {
         sides.zip(voxels.as_flattened()).for_each(|((_, sum), voxels)| *sum += voxels);
     }
 
-    /// Whether the region has voxels at the border of the image.
+    /// True if the region has voxels at the border of the image.
     pub(crate) fn is_touched(&self) -> bool {
         self.sides.as_flattened().iter().any(|(_, voxels)| *voxels > 0)
     }

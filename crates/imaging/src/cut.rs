@@ -19,7 +19,7 @@ const MOST_VOXELS: usize = 1 << 25;
 pub enum Choice {
     /// These labels.
     Labels(Vec<i32>),
-    /// All voxels of at least this value, with label 1.
+    /// Voxels of at least this value, with label 1.
     From(f64),
 }
 
@@ -45,8 +45,9 @@ impl Cut {
 }
 
 impl Image {
-    /// The labels selected by words; an error if the image has no labels, lacks some of them, or has one in a
-    /// group and elsewhere. The labels of a group become one in the image. A note tells of rounded labels.
+    /// Returns the labels selected by words. It is an error if the image has no labels, lacks a selected one,
+    /// or has one in a group and elsewhere. The labels of a group become one in the image. Rounded labels are
+    /// noted.
     pub fn choose(&mut self, choices: &[LabelChoice]) -> Result<Choice, LabelError> {
         let present = self.survey()?;
         let (mut chosen, mut groups) = (Vec::new(), Vec::new());
@@ -190,8 +191,8 @@ impl Image {
         (0..nz).into_par_iter().filter_map(in_slice).reduce_with(wider)
     }
 
-    /// The labels of a choice in a box, in voxels of so many of the image each: the label that most of them
-    /// have.
+    /// Labels of a choice in a box, in coarser voxels of `factors` voxels of the image along each axis. Each
+    /// takes the label that most of its voxels have.
     fn resampled(
         &self,
         choice: &Choice,
@@ -232,7 +233,7 @@ impl Image {
     }
 }
 
-/// How many voxels along each axis become one: 1 unless the box is too large, first along the finest axes.
+/// Voxels along each axis that become one: 1 unless the box is too large, first along the finest axes.
 fn factors(dims: [usize; 3], spacing: [f64; 3], coarsest: f64) -> [usize; 3] {
     let mut factors = [1; 3];
     let size = |factors: [usize; 3]| (0..3).map(|axis| dims[axis].div_ceil(factors[axis])).product::<usize>();

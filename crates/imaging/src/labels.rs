@@ -1,5 +1,5 @@
-//! What regions an image of labels holds: size, place, and pieces joined through faces of voxels. Runs of
-//! equal labels along i are joined with the runs of neighbouring rows (He, Chao, Suzuki 2008).
+//! Regions in an image of labels: size, place, and pieces joined through faces of voxels. Runs of equal
+//! labels along i are joined with the runs of neighbouring rows (He, Chao, Suzuki 2008).
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -128,7 +128,7 @@ pub(crate) struct Components {
 }
 
 impl Components {
-    /// Of all voxels whose label is not `background`.
+    /// Joins all voxels whose label is not `background`.
     pub(crate) fn new(dims: [usize; 3], label: impl Fn(usize) -> i32, background: i32) -> Self {
         let [nx, ny, nz] = dims;
         let mut runs: Vec<Run> = Vec::new();

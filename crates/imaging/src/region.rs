@@ -14,9 +14,9 @@ pub(crate) const LARGEST: u64 = 1 << 30;
 pub struct Region {
     /// The first label of the region, for messages.
     pub label: i32,
-    /// Where the voxels of the box are.
+    /// Grid of the voxels of the box.
     pub grid: Grid,
-    /// Whether each voxel is inside, i fastest.
+    /// True for each voxel inside, i fastest.
     pub inside: Vec<bool>,
 }
 

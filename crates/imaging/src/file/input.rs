@@ -14,7 +14,7 @@ use crate::image::{Numbers, Order, Scalar};
 /// Longest header of a text format; NRRD's of 3D Slicer list every segment.
 const HEADER_LIMIT: u64 = 1 << 22;
 
-/// Voxels are read in pieces of so many bytes, with progress reported after each.
+/// Bytes of the pieces in which voxels are read, with progress reported after each.
 const PIECE: u64 = 1 << 24;
 
 /// A place that moves through the bytes of a file.
@@ -75,18 +75,18 @@ impl<'a> Input<'a> {
         Input { bytes: Box::new(&mut self.bytes), path, within, progress, ..*self }
     }
 
-    /// What follows, packed with gzip.
+    /// Unpacks the rest with gzip.
     pub(crate) fn unpack_gzip(self) -> Self {
         Self { bytes: Box::new(BufReader::new(MultiGzDecoder::new(self.bytes))), packed: true, ..self }
     }
 
-    /// What follows, packed with zlib.
+    /// Unpacks the rest with zlib.
     pub(crate) fn unpack_zlib(self) -> Self {
         Self { bytes: Box::new(BufReader::new(ZlibDecoder::new(self.bytes))), packed: true, ..self }
     }
 
-    /// The file of this name beside this one, from its start, compressed or not. It starts with voxels, which
-    /// may look like anything.
+    /// Opens the file of this name in the same folder, from its start, compressed or not. It starts with
+    /// voxels, which may look like anything.
     pub fn beside(&self, field: &'static str, name: &str) -> Result<Input<'a>, Fault> {
         let Some(path) = &self.path else {
             return Err(ImageProblem::Unsupported {
@@ -201,7 +201,7 @@ impl<'a> Input<'a> {
         Ok(Numbers { scalar, order, bytes })
     }
 
-    /// Bytes of so many numbers, if that many may be read.
+    /// Bytes of `count` numbers, if the limit allows them.
     pub(crate) fn within_limit(&self, count: usize, scalar: Scalar) -> Result<u64, ImageProblem> {
         let (bytes, limit) = (count as u64 * scalar.size() as u64, self.limit);
         if bytes > limit { Err(ImageProblem::TooManyBytes { bytes, limit }) } else { Ok(bytes) }

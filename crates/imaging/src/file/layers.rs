@@ -1,5 +1,6 @@
-//! Segmentations of 3D Slicer in layers (`.seg.nrrd` with a first axis of layers): several label images of
-//! the same voxels, in which segments may overlap and use a value again. They become one label image.
+//! Segmentations of 3D Slicer in layers (`.seg.nrrd` with a first axis of layers). The layers are label
+//! images of the same voxels, in which segments may overlap and use a value again. They become one label
+//! image.
 
 use std::collections::{BTreeMap, BTreeSet};
 

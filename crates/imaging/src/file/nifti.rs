@@ -23,7 +23,7 @@ const HEADER: [usize; 2] = [348, 540];
 const POSITIVE: &str =
     "spacings must be positive and finite; correct pixdim (e.g. with fslorient or nibabel)";
 
-/// Whether the first bytes belong to NIfTI, in either byte order.
+/// True if the first bytes belong to NIfTI, in either byte order.
 pub(super) fn has_magic(head: &[u8]) -> bool {
     let magic =
         |at: usize, words: [&[u8]; 2]| words.iter().any(|word| head.get(at..at + word.len()) == Some(word));
