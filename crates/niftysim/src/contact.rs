@@ -2,8 +2,8 @@
 //! bodies that touch each other.
 //!
 //! Plates, cylinders and probes move by POLY345, surfaces in proportion to time. NiftySim moves single nodes
-//! out of them; a scene keeps out the faces whose nodes they are. Leaves out: `<KinematicContact>`, and what
-//! [`Remarks::missing`] names.
+//! out of these rigid things; a scene keeps out the faces of these nodes. Leaves out: `<KinematicContact>`,
+//! and the items of [`Remarks::missing`].
 
 use std::collections::BTreeSet;
 
@@ -26,21 +26,21 @@ const RECTANGLE: f64 = 1e-3;
 /// Rows of a table of poses.
 const POSES: u32 = 1000;
 
-/// What touches.
+/// Contacts of a model.
 #[derive(Debug, Default)]
 pub(super) struct Contact {
     /// Rigid things.
     pub things: Vec<Thing>,
-    /// How bodies touch each other, if they do.
+    /// Contact of bodies with each other, if any.
     pub bodies: Option<Bodies>,
     /// Distance that surfaces of rigid meshes and bodies keep [m].
     pub margin: f64,
 }
 
-/// How bodies touch each other.
+/// Contact of bodies with each other.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bodies {
-    /// Whether a body also touches itself.
+    /// True if a body also touches itself.
     pub themselves: bool,
     pub friction: f64,
 }
@@ -53,9 +53,9 @@ pub(super) struct Thing {
     /// `plate`, `cylinder`, `probe` or `surface`.
     pub kind: &'static str,
     pub form: RigidForm,
-    /// Where the origin of its frame is [m].
+    /// Origin of its frame [m].
     pub at: [f64; 3],
-    /// How its frame is turned [rad]: about this vector by its length.
+    /// Turn of its frame [rad]: about this vector by its length.
     pub turn: [f64; 3],
     pub motion: RigidMotion,
     /// By how much its radius grows [m], along POLY345.
@@ -76,11 +76,11 @@ pub(super) enum RigidForm {
     Cylinder([f64; 2]),
     /// Radius and length of the segment [m].
     Capsule([f64; 2]),
-    /// What a closed surface encloses; with bodies inside of it if it faces inward.
+    /// The inside of a closed surface. If the surface faces inward, bodies are inside.
     Mesh { mesh: Mesh, inside: bool },
 }
 
-/// How a rigid thing moves.
+/// Motion of a rigid thing.
 #[derive(Debug)]
 pub(super) enum RigidMotion {
     Rest,
@@ -98,7 +98,7 @@ pub(super) enum RigidMotion {
     Poses(Vec<[f64; 8]>),
 }
 
-/// Reads the contacts of a model of so many nodes.
+/// Reads the contacts of a model of `nodes` nodes.
 pub(super) fn read(
     root: XmlElement<'_>,
     nodes: usize,

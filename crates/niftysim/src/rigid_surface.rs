@@ -87,8 +87,8 @@ fn split(cells: &[u32], corners: usize) -> Vec<[u32; 3]> {
 }
 
 impl RigidSurface {
-    /// A closed surface as a mesh, whether bodies are inside of it, and the thickness [m] that a sheet got;
-    /// or why there is none.
+    /// Makes a mesh of a closed surface. Also returns whether bodies are inside, and the thickness [m] that a
+    /// sheet got. The error says why no mesh is possible.
     pub fn solid(self) -> Result<(Mesh, bool, Option<f64>), String> {
         let Self { points, triangles } = self.welded();
         if triangles.is_empty() {

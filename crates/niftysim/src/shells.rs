@@ -2,8 +2,8 @@
 //! bent.
 //!
 //! `NeoHookean` is the incompressible law S = μ (I − λ₃² C⁻¹), a neo-Hookean membrane with ν = 0.5 and E = 3
-//! μ. `Linear` is linear in the displacements, with axes that stay those at rest; the membrane of St Venant
-//! and Kirchhoff with the same E and ν is it for small ones. Leaves out: shells that bend, and shells on
+//! μ. `Linear` is linear in the displacements, with the axes at rest. For small displacements it equals the
+//! membrane of St Venant and Kirchhoff with the same E and ν. Leaves out: shells that bend, and shells on
 //! hexahedra; [`Remarks::missing`] names them.
 
 use pliant_geometry::boundary;
@@ -130,7 +130,7 @@ fn triangles(of: XmlElement<'_>, kind: &str, geometry: &Geometry) -> Result<Vec<
     }
 }
 
-/// The elements of a set, of so many.
+/// Reads the elements of a set, out of `all`.
 fn members(set: XmlElement<'_>, all: usize) -> Result<Vec<u32>, Fault> {
     match attribute(set, "Size", "Size=\"all\" or a number")? {
         "all" => Ok((0..all as u32).collect()),

@@ -21,7 +21,7 @@ pub(super) struct System {
 
 /// More steps than anyone takes.
 const MOST_STEPS: f64 = 1e12;
-/// How to write the settings, for messages.
+/// Syntax of the settings, for messages.
 pub(super) const SYSTEM: &str = "<SystemParams> with <TimeStep>, <TotalTime> and <DampingCoeff>";
 
 impl System {
