@@ -21,7 +21,7 @@ pub enum MeshingError {
         /// Requested fraction of the ideal.
         target: f64,
     },
-    /// Cells that differ too much in size.
+    /// The cells differ too much in size.
     #[error(
         "cells of {} m beside cells of {} m are too small; the limit is {} m", rounded(*asked), rounded(*edge), rounded(*smallest)
     )]
@@ -166,7 +166,7 @@ fn rounded(length: f64) -> f64 {
     (length * 1e6).round() / 1e6
 }
 
-/// By how much the edge must grow for the cells to fit, rounded up to two decimals.
+/// Factor by which the edge must grow for the cells to fit, rounded up to two decimals.
 fn factor(estimate: u64, limit: usize) -> f64 {
     ((estimate as f64 / limit.max(1) as f64).cbrt() * 100.0).ceil() / 100.0
 }

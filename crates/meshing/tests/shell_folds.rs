@@ -140,7 +140,7 @@ fn normals_stand_on_their_triangles_at_flaps_and_sharp_rims() {
     }
 }
 
-/// 1 % is out of reach; the report says so, of the shells that were repaired.
+/// 1 % is out of reach; the report of the repaired shells must say so.
 #[test]
 #[ignore = "about a minute each"]
 fn shells_of_a_fold_do_not_cross_where_the_goal_is_out_of_reach() {

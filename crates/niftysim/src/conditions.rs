@@ -130,7 +130,7 @@ impl ConditionReader<'_> {
         vec![Condition { line: line(of), action, shape, nodes, values: Vec::new(), faces: Vec::new() }]
     }
 
-    /// A displacement or force: one condition for each different magnitude.
+    /// Reads a displacement or force as one condition for each different magnitude.
     fn valued(
         &mut self,
         of: XmlElement<'_>,
@@ -222,7 +222,7 @@ impl ConditionReader<'_> {
         }
     }
 
-    /// The forces on the nodes of faces that each have a traction of their own.
+    /// The forces on the nodes of faces that each have their own traction.
     fn traction_of_each_face(
         &mut self,
         of: XmlElement<'_>,
@@ -309,8 +309,8 @@ impl ConditionReader<'_> {
         Ok(Selection::Normal { direction: numbers_of::<3>(normal, "components")?, within })
     }
 
-    /// The faces of a constraint that lie on the boundary, each turned outwards: those given so, and those
-    /// given the other way round.
+    /// The faces of a constraint that lie on the boundary, each turned outwards. Faces listed outwards come
+    /// first, then faces listed inwards.
     fn faces(&mut self, of: XmlElement<'_>) -> Result<[Vec<Vec<u32>>; 2], Fault> {
         let listed = self.listed_faces(of)?;
         Ok(self.turn_outwards(of, &listed))

@@ -21,7 +21,7 @@ use super::xml::{
     run_of_indices,
 };
 
-/// Cosine of the angle between the edges of a plate from which on it is no rectangle.
+/// Largest cosine of the angle between the edges of a plate that counts as a rectangle.
 const RECTANGLE: f64 = 1e-3;
 /// Rows of a table of poses.
 const POSES: u32 = 1000;
@@ -58,7 +58,7 @@ pub(super) struct Thing {
     /// Turn of its frame [rad]: about this vector by its length.
     pub turn: [f64; 3],
     pub motion: RigidMotion,
-    /// By how much its radius grows [m], along POLY345.
+    /// Growth of its radius [m], along POLY345.
     pub growth: f64,
     /// The nodes of the model that touch it; all if not given.
     pub nodes: Option<BTreeSet<u32>>,
@@ -350,7 +350,7 @@ impl ContactReader<'_> {
             let place = centre + shift * part - turn * centre;
             [time, place.x, place.y, place.z, turn.w, turn.i, turn.j, turn.k]
         };
-        // One more, so that it still moves at the end.
+        // One row more, so that it still moves at the end.
         (0..=POSES + 1).map(row).collect()
     }
 
@@ -392,7 +392,7 @@ fn shift(of: XmlElement<'_>, name: &'static str) -> Result<RigidMotion, Fault> {
     Ok(if by == [0.0; 3] { RigidMotion::Rest } else { RigidMotion::Smooth(by) })
 }
 
-/// A number of at least 0, which is 0 if it is not given.
+/// A number of at least 0; 0 if it is not given.
 fn at_least_0(of: XmlElement<'_>, name: &'static str, what: &'static str) -> Result<f64, Fault> {
     let Some(of) = child(of, name) else { return Ok(0.0) };
     let value = number(of)?;

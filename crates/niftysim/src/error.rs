@@ -29,7 +29,7 @@ pub enum ImportError {
         /// Message of the XML reader.
         reason: String,
     },
-    /// An element of the XML says what it cannot mean.
+    /// An element of the XML has an impossible value.
     #[error("`{}`, line {line}, <{element}>: {problem}", path.display())]
     Content {
         /// The file.
@@ -113,7 +113,7 @@ pub enum ImportProblem {
         /// The words that are known.
         known: &'static str,
     },
-    /// Two statements that do not go together.
+    /// Two statements contradict each other.
     #[error("{what}; {remedy}")]
     Contradiction {
         /// Both, with their numbers.

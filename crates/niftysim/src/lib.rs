@@ -41,7 +41,8 @@ struct Files<'a> {
 }
 
 impl Files<'_> {
-    /// Reads a mesh beside the model; else in the working directory, which is all that NiftySim itself knows.
+    /// Reads a mesh from the folder of the model, else from the working directory, the only place where
+    /// NiftySim itself looks.
     fn mesh(&self, name: &str) -> Result<MeshFile, MeshFileError> {
         let read = |path: &Path| {
             let allowed = self.reads.allow(path);

@@ -21,13 +21,13 @@ use crate::surface::nesting::{box_of, containers, corners_of, shells, signed_vol
 use crate::surface::triangles::{SurfaceRepairs, TriangleMesh};
 use crate::surface::winding::Winding;
 
-/// Steps of the grid along an edge of the cells: the most for which it fits into memory.
+/// Steps of the grid along an edge of the cells; the largest number that fits into memory is used.
 const STEPS_PER_EDGE: [f64; 3] = [4.0, 3.0, 2.0];
 
 /// Distances beyond this many edges of the cells are cut.
 const REACH: f64 = 2.0;
 
-/// Points of the grid at most: 256 MiB.
+/// Most points of the grid: 256 MiB.
 pub(crate) const MOST_POINTS: usize = 1 << 26;
 
 /// Points along each side of the blocks that are skipped where they are far from the surface.
@@ -64,7 +64,7 @@ pub struct EnclosedReport {
     pub closed_edges: usize,
     /// Width of the widest of them [m].
     pub widest_hole: f64,
-    /// Pairs of triangles that pass through each other: what overlaps was joined.
+    /// Pairs of triangles that pass through each other: overlapping parts were joined.
     pub crossings: usize,
     /// Place of the first crossing [m].
     pub first_crossing: Option<[f64; 3]>,
@@ -157,7 +157,7 @@ impl Enclosed {
         Ok(found)
     }
 
-    /// The enclosed volume [m³]; what overlaps counts as often as it does.
+    /// The enclosed volume [m³]; overlaps count several times.
     pub fn volume(&self) -> f64 {
         signed_volume(&self.points, &self.triangles)
     }

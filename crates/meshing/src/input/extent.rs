@@ -1,4 +1,5 @@
-//! Before anything is allocated: is the box of a field sound, and how many cells will its body need?
+//! Checks before any allocation: the box of a field is sound, and the number of cells of its body is within
+//! the limit.
 
 use pliant_geometry::{CellKind, Vector3};
 

@@ -59,7 +59,7 @@ impl Given {
         }
     }
 
-    /// Its faces; of voxels those between different materials, whose labels are given.
+    /// Its faces. Of voxels these are the faces between different materials; `labels` gives their labels.
     pub(crate) fn patches(&self, labels: &[i32]) -> Patches {
         match self {
             Self::Triangles(surface, label) => {

@@ -56,8 +56,8 @@ impl Anatomy<'static> {
         }
         volumes[0] = Some(whole.volume() - others);
         if labels.len() > 2 {
-            // The remainder of several others is a poor measure of the first one: where two of them meet, it
-            // is as near as they are.
+            // The remainder of several others measures the first one poorly: where two others meet, it is as
+            // near as they are.
             let first = parts.distance_field(1, smoothing, &part(labels.len()))?;
             materials[0].1 = Some(Box::new(first));
         }

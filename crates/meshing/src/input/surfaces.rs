@@ -19,7 +19,7 @@ pub(crate) struct Surfaces<'a> {
 }
 
 impl<'a> Surfaces<'a> {
-    /// For a mesh with a lattice constant [m].
+    /// Makes the surfaces for a mesh with a lattice constant [m].
     pub(crate) fn new(anatomy: &'a Anatomy<'a>, edge: f64) -> Self {
         Self {
             anatomy,
@@ -182,7 +182,7 @@ impl Constraints {
             2 => {
                 let (aa, ab, bb) = (a.norm_squared(), a.dot(b), b.norm_squared());
                 let determinant = aa * bb - ab * ab;
-                // Surfaces that meet at less than 0.6° have no line to speak of.
+                // Surfaces that meet at less than 0.6° have no usable line.
                 (determinant > 1e-4 * aa * bb)
                     .then(|| a * ((bb * p - ab * q) / determinant) + b * ((aa * q - ab * p) / determinant))
             }

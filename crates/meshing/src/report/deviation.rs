@@ -16,7 +16,7 @@ use crate::report::hausdorff::{Sample, distance};
 use crate::report::percentiles::Percentiles;
 use crate::tets::topology::faces_between_labels;
 
-/// Samples of the field along the longest side of its box at most.
+/// Most samples of the field along the longest side of its box.
 const MOST_SAMPLES: f64 = 160.0;
 
 /// Steps of Newton's method to the surface.
@@ -172,8 +172,8 @@ impl Deviation {
         Ok(Measured::to_field(mesh, field, edge)?.deviation())
     }
 
-    /// Between the triangles of a mesh and of its input with chosen sides, with samples at most `spacing` [m]
-    /// apart; `None` if one of them has none.
+    /// Distances between the triangles of a mesh and of its input with chosen sides, with samples at most
+    /// `spacing` [m] apart. `None` if either has no such triangles.
     pub(crate) fn between(
         mesh: &Patches,
         given: &Patches,
@@ -241,7 +241,7 @@ impl Near {
         Self { points, cubes, edge }
     }
 
-    /// Distance to the nearest of them [m]; infinite without any.
+    /// Distance to the nearest point [m]; infinite without any.
     fn distance(&self, from: &Vector3) -> f64 {
         let own = cube(from, self.edge);
         let near = (0..27).map(|at| [own[0] + at % 3 - 1, own[1] + at / 3 % 3 - 1, own[2] + at / 9 - 1]);

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use crate::surface::triangles::TriangleMesh;
 
-/// Samples along an edge at most.
+/// Most samples along an edge.
 const MOST_ALONG: usize = 64;
 
 /// Distances between two surfaces [m]: from the first to the second, and back.

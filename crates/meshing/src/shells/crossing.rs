@@ -1,7 +1,8 @@
-//! Crossings of shells with themselves or each other: small flat pieces of the curved surface are tested, and
-//! an edge of one pierces another. No step of the fit makes flat triangles cross, nor curved ones once
-//! normals stand. Curved shells that cross all the same are flattened and halved. At the end the remaining
-//! ones are flattened as long as that helps, then repaired (`repair`). Leaves out: pieces that share an edge.
+//! Crossings of shells with themselves or each other. Shells cross if, among small flat pieces of the curved
+//! surface, an edge of one piece pierces another. No step of the fit makes flat triangles cross, nor curved
+//! ones once normals stand. Curved shells that cross all the same are flattened and halved. At the end the
+//! remaining ones are flattened as long as that helps, then repaired (`repair`). Leaves out: pieces that
+//! share an edge.
 
 use std::collections::BTreeMap;
 
@@ -19,7 +20,7 @@ use crate::surface::crossings::crossing_groups;
 pub(super) const COARSE: usize = 4;
 const FINE: usize = 8;
 
-/// Pieces at most that are looked at in [`FINE`] parts.
+/// Most pieces that are tested with [`FINE`] parts of an edge.
 const MOST_PIECES: usize = 200_000;
 
 /// Steps to undo crossings after the fit, from little to the whole way.
@@ -28,8 +29,8 @@ const STEPS: usize = 5;
 /// Shells that cross others or themselves.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Crossing {
-    /// Pairs of numbers of their triangles, smaller first, increasing. What crosses itself is a pair with
-    /// itself.
+    /// Pairs of numbers of their triangles, smaller first, increasing. A shell that crosses itself is a pair
+    /// with itself.
     pub(super) pairs: Vec<[u32; 2]>,
     /// A point where the first pair meets [m].
     pub(super) place: Option<Vector3>,
@@ -50,7 +51,7 @@ impl Shells {
         self.crossing_of(self.mesh.alive().collect(), self.parts_in_the_end(), |_| true)
     }
 
-    /// Parts of an edge in which all are looked at in the end.
+    /// Parts of an edge in which all shells are tested in the end.
     pub(super) fn parts_in_the_end(&self) -> usize {
         if self.mesh.len() * FINE * FINE <= MOST_PIECES { FINE } else { COARSE }
     }
@@ -161,7 +162,7 @@ impl Shells {
     }
 }
 
-/// The number of a place of a shell among the points, which it joins if it is new.
+/// Returns the number of a place of a shell among the points. A new place is added.
 fn numbered(
     patch: &CurvedTriangle,
     nodes: [u32; 3],

@@ -19,7 +19,7 @@ use crate::report::hausdorff::lattice;
 /// Parts of an edge between the places of a shell at which it is fitted.
 const PARTS: usize = 5;
 
-/// Points of the target count from this part of the distance asked for.
+/// Points of the target count from this part of the requested distance.
 const CLOSE: f64 = 0.3;
 
 /// Largest number of points of the target that all count at one shell. If there are more, only the farthest
@@ -27,7 +27,7 @@ const CLOSE: f64 = 0.3;
 const MOST_BACK: usize = 128;
 const BINS: f64 = 11.0;
 
-/// Largest turn of a normal in one step [rad], and way over the mean length of edges.
+/// Largest turn of a normal in one step [rad], and largest move over the mean length of edges.
 const LARGEST_TURN: f64 = 0.3;
 const LARGEST_WAY: f64 = 0.2;
 
@@ -47,7 +47,7 @@ const TRIES: [(f64, bool); 8] = [
 /// Normals that need not stand on their triangles are not turned below this cosine, either.
 const LEAST_ALONG: f64 = 0.2;
 
-/// Shells that crossed before a step, flat and curved, where that was asked.
+/// Shells that crossed before a step, flat and curved, if computed.
 type Crossed = [Option<Vec<u32>>; 2];
 
 /// A shell that moves, and the points of the target that count at it.
@@ -122,8 +122,8 @@ impl Shells {
         (0..).zip(&self.mesh.points).map(|(v, x)| self.upright_round(v, x)).collect()
     }
 
-    /// Corners that move of shells that cross others and did not before: of flat triangles, and once normals
-    /// stand of curved ones.
+    /// Moving corners of shells that cross others and did not before: flat triangles, and once normals stand
+    /// also curved ones.
     fn newly_crossed(&self, before: &Self, crossed: &mut Crossed, effort: &mut Effort) -> Vec<usize> {
         let mut nodes = Vec::new();
         for (parts, old) in [1, COARSE].into_iter().zip(crossed).take(if self.strict { 2 } else { 1 }) {

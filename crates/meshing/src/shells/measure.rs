@@ -12,14 +12,14 @@ use super::{FittedShells, ShellGoal, Shells};
 use crate::report::hausdorff::{Hausdorff, Sample, distance, lattice, locator, samples, spread};
 use crate::surface::triangles::shape;
 
-/// Parts of an edge of the flat triangles among which the nearest place of the shells is looked for.
+/// Parts of an edge of the flat triangles that start the search for the nearest place of the shells.
 const FACETS: usize = 8;
 
 /// Parts of an edge with more than [`MANY`] shells.
 const FEWER_FACETS: usize = 4;
 const MANY: usize = 2000;
 
-/// Steps to the nearest place of a shell from there on.
+/// Steps from there to the nearest place of a shell.
 const STEPS: usize = 10;
 
 /// Place on the shells that is nearest to a point of the target.
@@ -31,23 +31,23 @@ pub(super) struct Landing {
     pub(super) shell: u32,
     pub(super) place: [f64; 3],
     pub(super) off: f64,
-    /// Unit vector from the point to there.
+    /// Unit vector from the point to its nearest place.
     pub(super) along: Vector3,
 }
 
 /// Distances of shells.
 #[derive(Clone)]
 pub(super) struct Distances {
-    /// The largest of each shell from the target, by the number of its triangle [m].
+    /// Largest distance of each shell from the target, by the number of its triangle [m].
     there: Vec<f64>,
-    /// Parts of an edge between the places of a shell that were looked at.
+    /// Parts of an edge between the sampled places of a shell.
     parts: usize,
     /// Nearest places of the points of the target, in the order of these points.
     pub(super) landings: Vec<Landing>,
 }
 
 impl Distances {
-    /// The largest of each shell, by the number of its triangle, both ways [m].
+    /// Largest distance of each shell, both ways, by the number of its triangle [m].
     pub(super) fn far(&self) -> Vec<f64> {
         let mut far = self.there.clone();
         for landing in &self.landings {
@@ -81,7 +81,7 @@ impl Distances {
         }
     }
 
-    /// The largest distance of points of the target.
+    /// The largest distance of points of the target from the shells.
     pub(super) fn largest_back(&self) -> f64 {
         self.landings.iter().map(|landing| landing.off).fold(0.0, f64::max)
     }
@@ -144,7 +144,7 @@ impl Shells {
         Distances { there, parts: before.parts, landings: before.landings.par_iter().map(again).collect() }
     }
 
-    /// The largest distance of shells from the target.
+    /// Computes the largest distance of each of some shells from the target.
     fn measure(&self, shells: &[u32], parts: usize, target: &Target, there: &mut [f64]) {
         let places = lattice(parts);
         let of = |&t: &u32| {
@@ -276,11 +276,11 @@ impl Shells {
 
 /// The curved surface in small triangles.
 struct Picture {
-    /// With its distances from the target.
+    /// The triangles, with their distances from the target.
     error_map: Mesh,
-    /// The largest of these and their root mean square [m].
+    /// The largest of these distances and their root mean square [m].
     forward: (f64, f64),
-    /// The largest of each shell [m].
+    /// The largest distance of each shell [m].
     far: Vec<f64>,
     /// Place of the largest distance [m].
     farthest: Vector3,
@@ -302,7 +302,7 @@ pub(super) fn pieces(n: usize) -> Vec<[u32; 3]> {
     found
 }
 
-/// Finds the nearest place of all shells, from small flat triangles on.
+/// Search for the nearest place of all shells, which starts from small flat triangles.
 struct Nearest {
     patches: Vec<CurvedTriangle>,
     triangles: Vec<u32>,
@@ -328,8 +328,7 @@ impl Nearest {
         Self { patches, triangles, locator: SurfaceLocator::new(&surface, &faces, &mesh.points), places }
     }
 
-    /// The nearest place of the shells.
-    /// The shell, the place on it and the distance [m] that are nearest to a point.
+    /// Returns the shell, the place on it and the distance [m] that are nearest to a point.
     fn nearest(&self, point: &Vector3) -> Option<(usize, [f64; 3], f64)> {
         Some(self.refined_from(point, self.locator.closest(point)?))
     }

@@ -39,32 +39,32 @@ pub use report::{Flaw, ShellReport};
 use start::{Starts, UNCROSSED};
 use target::Target;
 
-/// Rounds after an error is reached, where distances can fall or triangles are poor.
+/// Rounds after the requested error is reached, if distances can fall or triangles are poor.
 const LAST_ROUNDS: usize = 4;
 
-/// Rounds of refinement at most.
+/// Most rounds of refinement.
 const MOST_ROUNDS: usize = 40;
 
 /// No step of the fit leaves a triangle of a worse shape, unless it was worse before.
 const LEAST_SHAPE: f64 = 0.65;
 
-/// Among the last rounds those without a triangle worse than this come first.
+/// Among the last rounds, those without a triangle of a worse shape come first.
 const POOR: f64 = 0.6;
 
-/// Part of the way to the goal after which distances are looked at closely.
+/// Part of the way to the goal after which distances are measured closely.
 const CLOSELY: f64 = 0.9;
 
 /// Part of the way to the goal after which normals stand on their triangles.
 const UPRIGHT_FROM: f64 = 0.7;
 
-/// Part of the work allowed after which they do where the goal is farther.
+/// Part of the work allowed after which normals stand on their triangles, even if the goal is farther.
 const UPRIGHT_AFTER: f64 = 0.6;
 
-/// Rounds more in which shells are mended that cross or have a crease.
+/// Additional rounds in which shells that cross or have a crease are mended.
 const MENDING_ROUNDS: usize = 4;
 
-/// Shells with creases or crossings are halved down to edges of this part of the diagonal, or of the error
-/// asked for.
+/// Shells with creases or crossings are halved down to edges of this part of the diagonal, or of the
+/// requested error.
 const LEAST_EDGE: f64 = 1e-3;
 
 /// Limits after which a fit is given up if there are finer triangles to start from. It has used more than
@@ -74,7 +74,7 @@ const GIVEN_UP: f64 = 0.5;
 const NEARER: f64 = 1.05;
 const STUCK: usize = 3;
 
-/// Part of the work allowed that a second fit has at least.
+/// Least part of the work allowed that a second fit has.
 const AGAIN: f64 = 0.5;
 
 /// Least shape of shells that keep sharp edges. If one is slimmer, shells without sharp edges are fitted,
@@ -83,7 +83,7 @@ const AGAIN: f64 = 0.5;
 const SLIM: f64 = 0.3;
 const MUCH: f64 = 2.0;
 
-/// Part of the work allowed that is left for the exchange of shells, at least.
+/// Least part of the work allowed that is left for the exchange of shells.
 const EXCHANGE: f64 = 0.25;
 
 /// Number of shells that are fitted once a round; fewer are fitted up to four times.
@@ -112,14 +112,14 @@ pub struct FittedShells {
     pub report: ShellReport,
 }
 
-/// Shells in the making.
+/// Shells during a fit.
 #[derive(Clone)]
 struct Shells {
     mesh: TriangleMesh,
     normals: Vec<Vector3>,
     /// Points of borders, which stay there.
     on_border: Vec<bool>,
-    /// Points that may move: those near what has changed. The others keep what was fitted.
+    /// Points that may move: those near changes. The others keep their fit.
     active: Vec<bool>,
     /// True if normals must stand on their triangles. On the way to the goal, while triangles are large, they
     /// need not: points that are held back then do not find their places.
@@ -136,18 +136,18 @@ struct Shells {
 /// Progress of a fit.
 #[derive(Clone, Copy, Debug)]
 pub struct FitProgress {
-    /// From 0 to 1: of the way to the goal or of the work allowed, whichever is more.
+    /// Fraction from 0 to 1 of the way to the goal or of the work allowed, whichever is more.
     pub part: f64,
     /// Round of refinement.
     pub round: usize,
     /// Shells so far.
     pub shells: usize,
-    /// Their largest distance as a part of the diagonal.
+    /// Largest distance of the shells as a part of the diagonal.
     pub off: f64,
 }
 
 impl FittedShells {
-    /// Fits shells to a surface. `progress` hears how far it has come.
+    /// Fits shells to a surface. `progress` hears the progress.
     pub fn new(
         target: &TriangleMesh,
         goal: ShellGoal,
@@ -212,7 +212,7 @@ impl FittedShells {
         first.better(attempt(usize::MAX))
     }
 
-    /// Fits the shells of given triangles to a surface, without changing which points they join.
+    /// Fits the shells of given triangles to a surface. The triangles keep their points.
     pub fn on(target: &TriangleMesh, triangles: &TriangleMesh) -> Self {
         let target = Target::new(target);
         let mut shells = Shells::new(triangles, &target);
@@ -226,14 +226,14 @@ impl FittedShells {
     }
 }
 
-/// Shells that were found, and what there is to know about them.
+/// Shells that were found, and their report.
 struct Found {
     shells: Shells,
     fitted: FittedShells,
 }
 
 impl Found {
-    /// The one that crosses less, reaches its goal, or is closer.
+    /// Returns the result that crosses less, reaches its goal, or is closer.
     fn better(self, other: Self) -> Self {
         if other.fitted.report.rank() < self.fitted.report.rank() { other } else { self }
     }
@@ -248,8 +248,8 @@ struct Job<'t> {
 }
 
 impl Job<'_> {
-    /// Fits from few triangles, if that fails from finer ones, and if shells still cross takes those that it
-    /// started from.
+    /// Fits from few triangles. If that fails, it fits from finer ones. If shells still cross, it takes the
+    /// shells that the fit started from.
     fn attempt(&self, starts: &Starts, effort: Effort) -> Found {
         let fit = |mesh, effort, is_last| Fit::new(self.target, mesh, self.goal, effort, is_last);
         if starts.is_lost {
@@ -284,7 +284,7 @@ impl Job<'_> {
 }
 
 impl Job<'_> {
-    /// Shells that are farther off than the error asked for, or than most, are flat where that is nearer.
+    /// Flattens shells that are farther off than the requested error, or than most, where that is nearer.
     fn flat_where_nearer(&self, found: Found) -> Found {
         let mut shells = found.shells.clone();
         let report = &found.fitted.report;
@@ -299,11 +299,11 @@ impl Job<'_> {
     }
 }
 
-/// A fit on its way.
+/// State of a fit.
 struct Fit<'t> {
     target: &'t Target,
     goal: ShellGoal,
-    /// The distance asked for [m]; 0 where a number of shells is.
+    /// The requested distance [m]; 0 if a number of shells is requested.
     aim: f64,
     shells: Shells,
     rounds: usize,
@@ -313,7 +313,7 @@ struct Fit<'t> {
     best: Option<(Rank, Shells)>,
     /// The largest part of the goal so far, and the round that reached it.
     nearest: (f64, usize),
-    /// Rounds that are left once the goal is reached, and those to mend shells in.
+    /// Rounds that are left once the goal is reached, and rounds that are left for mending.
     left: usize,
     mending: usize,
     /// True if nothing else is tried after a failure.
@@ -325,9 +325,9 @@ struct Fit<'t> {
 enum End {
     /// More rounds do not help.
     Done,
-    /// It comes no nearer, and another one can.
+    /// The fit comes no nearer, and another one can.
     GivenUp,
-    /// After all rounds, or all the work allowed.
+    /// No rounds are left, or no work allowed is left.
     Spent,
 }
 
@@ -359,7 +359,7 @@ impl<'t> Fit<'t> {
         }
     }
 
-    /// The shells of the triangles that it starts from, which do not cross, with the normals of the target.
+    /// The shells of the initial triangles, which do not cross, with the normals of the target.
     fn unfitted(mut self) -> Found {
         self.shells.require_upright();
         self.shells.uncross(&mut self.effort);
@@ -368,7 +368,7 @@ impl<'t> Fit<'t> {
         Found { shells: self.shells, fitted }
     }
 
-    /// Fits as long as it helps. Returns the shells, and the work done so far.
+    /// Fits as long as that helps. Returns the shells, and the work done so far.
     fn run(mut self, progress: &dyn Fn(FitProgress)) -> (Found, Effort) {
         let target = self.target;
         self.shells.even_out(target, 10, &mut self.effort);
@@ -418,12 +418,12 @@ impl<'t> Fit<'t> {
         !self.is_last && stays && self.effort.part() > GIVEN_UP
     }
 
-    /// Makes normals stand on their triangles, or looks at distances closely, where it is time for that; the
-    /// distances then.
+    /// Makes normals stand on their triangles, or measures distances closely, once the fit is far enough.
+    /// Returns the new distances.
     fn measured_anew(&mut self, part: f64, bound: f64) -> Option<Distances> {
         let target = self.target;
         let detail = if !self.shells.strict && (part >= UPRIGHT_FROM || self.effort.part() >= UPRIGHT_AFTER) {
-            // Those before may cross.
+            // Earlier shells may cross.
             self.best = None;
             self.shells.require_upright();
             self.shells.uncross(&mut self.effort);
@@ -445,8 +445,8 @@ impl<'t> Fit<'t> {
     fn flawed(&mut self, far: &[f64], part: f64) -> Option<Vec<u32>> {
         let [creased, crossing] = if self.shells.strict { self.flaws() } else { Default::default() };
         let rank = self.rank(far, part, creased.len() + crossing.len());
-        // Halving what has a crease helps where a fold is wide enough for smaller shells, and not where it is
-        // sharp.
+        // Halving shells with a crease helps where a fold is wide enough for smaller shells, and not where it
+        // is sharp.
         let fewer = self.best.as_ref().is_none_or(|(best, _)| best.0 || rank.1 < best.1);
         let mut flawed = crossing;
         flawed.extend(creased.into_iter().filter(|_| fewer && part >= 1.0));
@@ -470,7 +470,7 @@ impl<'t> Fit<'t> {
         Some(flawed)
     }
 
-    /// The best shells so far, exchanged and repaired unless it is given up, and the work done.
+    /// Returns the best shells so far, exchanged and repaired unless the fit is given up, and the work done.
     fn end(mut self, end: End, progress: &dyn Fn(FitProgress)) -> (Found, Effort) {
         let target = self.target;
         let mut shells = self.best.map_or(self.shells, |(_, best)| best);
@@ -633,7 +633,7 @@ impl Shells {
         self.mesh.alive().filter(|&t| self.moves(t)).count()
     }
 
-    /// Fits until all distances are within `aim` [m], or they fall no more.
+    /// Fits until all distances are within `aim` [m], or they stop falling.
     fn settle(
         &mut self,
         mut now: Distances,

@@ -40,8 +40,7 @@ impl Part {
         Some(self.own.binary_search(&shell).ok()? as u32)
     }
 
-    /// Puts the part, which has changed, in its place in the whole, which has not changed since the part was
-    /// cut out.
+    /// Puts the changed part in its place in the whole, which has not changed since the part was cut out.
     pub(super) fn put_back(self, whole: &mut Shells, distances: &mut Distances) {
         let Self { shells, distances: found, mut own, mut nodes } = self;
         let moved: Vec<bool> = (0..whole.mesh.triangles.len() as u32).map(|t| whole.moves(t)).collect();

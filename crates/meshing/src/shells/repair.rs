@@ -1,7 +1,7 @@
 //! Undoing crossings at the end of a fit: corners of shells that cross are turned or moved, as long as fewer
 //! pairs cross. The target does not cross itself, nor do flat triangles close to it. So one aim is the target
-//! with its normals, the other flatter shells. A fit without crossings stays as it is, bit by bit. Leaves
-//! out: knots that no step of this list loosens. The report counts them.
+//! with its normals, the other flatter shells. A fit without crossings stays bit by bit. Leaves out: knots
+//! that no step of this list loosens. The report counts them.
 
 use std::cmp::Reverse;
 
@@ -13,10 +13,10 @@ use super::part::Part;
 use super::target::Target;
 use super::{POOR, Shells};
 
-/// Pieces of shells at most that all tries together look at: about 3 s of one core.
+/// Most pieces of shells that all tries together test: about 3 s of one core.
 const MOST_PIECES_TRIED: usize = 1_000_000;
 
-/// Times at most that corners of crossing shells become creases.
+/// Most times that corners of crossing shells become creases.
 const CREASINGS: usize = 8;
 
 /// Step of the corners of shells.
@@ -202,7 +202,7 @@ impl Shells {
     }
 }
 
-/// The corners of pairs that hang together by corners, for each such knot increasing.
+/// The corners of crossing pairs that are connected by corners, increasing for each such knot.
 fn knots(shells: &Shells, pairs: &[[u32; 2]]) -> Vec<Vec<u32>> {
     let mut knots: Vec<Vec<u32>> = Vec::new();
     for pair in pairs {

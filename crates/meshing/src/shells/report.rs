@@ -11,9 +11,9 @@ use crate::report::hausdorff::Hausdorff;
 /// Distances of shells from their target, and their shape.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ShellReport {
-    /// Shells.
+    /// Number of shells.
     pub shells: usize,
-    /// Their vertices.
+    /// Number of their vertices.
     pub nodes: usize,
     /// Least and mean shape of their flat triangles, 4 √3 A / Σ l²: 1 is equilateral.
     pub shape: [f64; 2],
@@ -21,13 +21,13 @@ pub struct ShellReport {
     pub distances: Hausdorff,
     /// Place of the largest distance [m].
     pub farthest: [f64; 3],
-    /// The distances of the flat triangles of the vertices.
+    /// Distances of the flat triangles of the vertices from the target, and back [m].
     pub flat: Hausdorff,
     /// Diagonal of the target's box [m].
     pub diagonal: f64,
     /// Rounds of refinement.
     pub rounds: usize,
-    /// The largest distance asked for as a part of the diagonal, where not a number of shells was.
+    /// The requested largest distance as a part of the diagonal; `None` if a number of shells is requested.
     pub asked: Option<f64>,
     /// True if the goal was reached.
     pub reached: bool,

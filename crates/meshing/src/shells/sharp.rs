@@ -10,14 +10,14 @@ use crate::surface::triangles::TriangleMesh;
 /// normals have creases.
 const SHARP: f64 = std::f64::consts::FRAC_PI_4;
 
-/// Sharp edges that hang together are this long at least, over the diagonal. Shorter ones are noise.
+/// Least length of connected sharp edges, over the diagonal. Shorter ones are noise.
 const LEAST_LENGTH: f64 = 0.05;
 
 /// The faces along sharp edges also meet other neighbours. The mean of the angles there is at most this part
 /// of the mean at the sharp edges. At thin edges of organs triangles turn step by step; such edges are round.
 const BESIDE: f64 = 0.25;
 
-/// Largest part of the surface that is nearer to sharp edges than the error asked for. Steps of voxels take a
+/// Largest part of the surface that is nearer to sharp edges than the requested error. Steps of voxels take a
 /// larger part, and are not sharp edges.
 const MOST_NEAR: f64 = 0.1;
 
@@ -123,7 +123,7 @@ mod tests {
         fitted
     }
 
-    /// A prism of four sides is a box: its shells are flat without being told to, and its corners stay.
+    /// A prism of four sides is a box: its shells are flat without further measures, and its corners stay.
     #[test]
     fn a_box_stays_a_box() {
         let report = fitted(&prism(4, 1), ShellGoal::Error(0.002)).report;

@@ -10,10 +10,10 @@ use super::target::Target;
 use crate::report::hausdorff::{distance, locator};
 use crate::surface::triangles::TriangleMesh;
 
-/// Shells to start from where an error is asked for.
+/// Shells to start from if an error is requested.
 const START: usize = 100;
 
-/// Doublings of their number at most.
+/// Most doublings of their number.
 const DOUBLINGS: u32 = 7;
 
 /// Parts are lost where a point of the target is farther from the flat triangles than this part of their mean
@@ -41,7 +41,8 @@ pub(super) struct Starts {
 }
 
 impl Starts {
-    /// Makes them of the surface of a target. From `uncrossed` triangles down they do not come to cross.
+    /// Makes the triangles from the surface of a target. From `uncrossed` triangles down, collapses do not
+    /// make them cross.
     pub(super) fn new(mesh: &TriangleMesh, goal: ShellGoal, target: &Target, uncrossed: usize) -> Self {
         let (numbers, aim) = match goal {
             ShellGoal::Error(error) => {
@@ -79,7 +80,7 @@ fn farthest(mesh: &TriangleMesh, target: &Target) -> f64 {
     far.reduce(|| 0.0, f64::max)
 }
 
-/// The edge of as many equilateral triangles of the same area [m].
+/// The edge of equilateral triangles of the same number and area [m].
 fn mean_edge(mesh: &TriangleMesh) -> f64 {
     let area: f64 = mesh.alive().map(|t| mesh.area(t)).sum();
     (4.0 * area / (3.0_f64.sqrt() * mesh.len().max(1) as f64)).sqrt()
@@ -114,8 +115,8 @@ mod tests {
         }
     }
 
-    /// A hundred triangles hold a ball, and not twenty rods: there, the fit starts from triangles that have
-    /// them all.
+    /// A hundred triangles hold a ball but not twenty rods. So the fit starts from triangles that have them
+    /// all.
     #[test]
     fn few_triangles_start_where_no_part_is_lost() {
         let starts = |field: &dyn ImplicitField, error: f64| {

@@ -11,7 +11,7 @@ use crate::report::hausdorff::{Sample, samples};
 use crate::surface::remesh::Reference;
 use crate::surface::triangles::TriangleMesh;
 
-/// Points of the target at most that are looked at in each round, and when all seems well.
+/// Most points of the target that are measured in each round, and for the final check.
 const MOST_COARSE: usize = 20_000;
 const MOST_FINE: usize = 80_000;
 
@@ -21,9 +21,9 @@ pub(super) const FACING: f64 = -0.3;
 /// The surface to be fitted.
 pub(super) struct Target {
     pub(super) reference: Reference,
-    /// Looked at in each round.
+    /// Measured in each round.
     pub(super) coarse: Detail,
-    /// Looked at when all seems well.
+    /// Measured for the final check.
     pub(super) fine: Detail,
     pub(super) diagonal: f64,
 }
@@ -44,7 +44,7 @@ impl Target {
         let reference = Reference::new(mesh);
         let area: f64 = mesh.alive().map(|t| mesh.area(t)).sum();
         let detail = |part: f64, most: usize, parts: usize| {
-            // Points so far apart that the whole area takes the most.
+            // Spacing at which the whole area takes the most points.
             let spacing = (diagonal * part).max((area / most as f64).sqrt());
             let samples = thinned(distinct(samples(mesh, spacing)), spacing, most);
             let normals = samples.par_iter().map(|sample| reference.closest(&sample.point).1).collect();
@@ -67,7 +67,7 @@ impl Target {
     }
 }
 
-/// Samples at the same place made one.
+/// Merges samples at the same place.
 fn distinct(mut samples: Vec<Sample>) -> Vec<Sample> {
     let place = |sample: &Sample| <[f64; 3]>::from(sample.point).map(f64::to_bits);
     samples.sort_by_key(place);
@@ -79,8 +79,8 @@ fn distinct(mut samples: Vec<Sample>) -> Vec<Sample> {
     samples
 }
 
-/// So few samples that no cube of a grid holds two, of cubes that grow until there are no more than `most`.
-/// One stands for the area of all in its cube.
+/// Thins samples so that no cube of a grid holds two. The cubes grow until there are no more than `most`. One
+/// sample stands for the area of all in its cube.
 fn thinned(mut samples: Vec<Sample>, spacing: f64, most: usize) -> Vec<Sample> {
     let mut size = 0.5 * spacing;
     while samples.len() > most {

@@ -117,8 +117,8 @@ fn nodes_of_a_sharp_rim_have_no_normal() {
     assert_eq!(fitted.report.crossings, Flaw::default());
 }
 
-/// A thousandth of a percent is out of reach with so little work: the fit stops, and says how close it is,
-/// and where.
+/// A thousandth of a percent is out of reach with a small amount of work. The fit stops, and reports how
+/// close it is, and where.
 #[test]
 fn a_fit_that_cannot_reach_its_goal_ends_with_the_best_so_far() {
     let mesh = surface(&Ellipsoid::sphere(Vector3::zeros(), 0.02), 0.003);
@@ -140,7 +140,7 @@ fn a_fit_that_cannot_reach_its_goal_ends_with_the_best_so_far() {
     assert!(short < long && more.report.distances.largest() < few.report.distances.largest());
 }
 
-/// The work does not grow with the triangles of the target: four times as many take as many rounds of as many
+/// The work does not grow with the triangles of the target: four times as many need as many rounds and
 /// searches.
 #[test]
 fn the_work_of_a_fit_does_not_grow_with_the_triangles_of_the_target() {

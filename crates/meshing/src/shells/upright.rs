@@ -65,7 +65,7 @@ fn middle(faces: &[Vector3]) -> Vector3 {
 }
 
 impl Shells {
-    /// From here on normals stand on their triangles.
+    /// Requires from this call on that normals stand on their triangles.
     pub(super) fn require_upright(&mut self) {
         self.strict = true;
         (0..self.mesh.points.len() as u32).for_each(|point| self.stand(point));
@@ -79,8 +79,8 @@ impl Shells {
         before >= least && after < least
     }
 
-    /// Turns the normal of a vertex as far as it must to stand on all triangles round it; a crease where none
-    /// does.
+    /// Turns the normal of a vertex just far enough to stand on all triangles round it. If no normal does,
+    /// the vertex becomes a crease.
     pub(super) fn stand(&mut self, point: u32) {
         if !self.strict || self.sharp[point as usize] {
             return;
@@ -156,8 +156,8 @@ impl Shells {
 mod tests {
     use super::*;
 
-    /// Two faces at an angle: the wish where it stands, else leaned to 60° from the farther one; none beyond
-    /// 120°.
+    /// Two faces at an angle: the wish where it stands, else the wish leaned to 60° from the farther face.
+    /// Beyond 120° no vector stands.
     #[test]
     fn a_normal_leans_no_more_than_it_must() {
         let tilted = |degrees: f64| Vector3::new(degrees.to_radians().sin(), 0.0, degrees.to_radians().cos());

@@ -17,12 +17,12 @@ pub(crate) struct Boxes {
 }
 
 impl Boxes {
-    /// None so far. Boxes much smaller than `finest` [m] would share cubes.
+    /// Makes an empty set. Boxes much smaller than `finest` [m] would share cubes.
     pub(crate) fn new(finest: f64) -> Self {
         Self { grids: BTreeMap::new(), finest: power(finest), len: 0 }
     }
 
-    /// None, with the same finest cubes.
+    /// Makes an empty set with the same finest cubes.
     pub(crate) fn emptied(&self) -> Self {
         Self { grids: BTreeMap::new(), finest: self.finest, len: 0 }
     }

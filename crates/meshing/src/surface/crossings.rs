@@ -77,13 +77,13 @@ pub(crate) fn crossing_groups(
     (pairs, place)
 }
 
-/// A box made to hold a point.
+/// Grows a box to hold a point.
 pub(crate) fn widened([low, high]: [Vector3; 2], x: &Vector3) -> [Vector3; 2] {
     [low.inf(x), high.sup(x)]
 }
 
 impl TriangleMesh {
-    /// The box of triangles; none of no triangles [m].
+    /// The box of triangles [m]; `None` without triangles.
     pub(crate) fn bounds(&self, triangles: &[[u32; 3]]) -> Option<[Vector3; 2]> {
         let start = self.points[*triangles.as_flattened().first()? as usize];
         let corners = triangles.as_flattened().iter().map(|&n| self.points[n as usize]);
@@ -162,7 +162,7 @@ fn pierced([p, q]: [Vector3; 2], [a, b, c]: [Vector3; 3]) -> Option<Vector3> {
 mod tests {
     use super::*;
 
-    /// Fans of triangles at places of a sequence that repeats itself no sooner than the test ends.
+    /// Fans of triangles at places of a sequence that does not repeat within the test.
     #[test]
     fn groups_cross_where_triangles_of_theirs_do() {
         let place =

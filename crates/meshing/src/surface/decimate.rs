@@ -16,22 +16,22 @@ use crate::surface::triangles::{TriangleMesh, cross};
 /// Planes through borders and creases weigh this many times as much as faces of the same size.
 const LINE_WEIGHT: f64 = 10.0;
 
-/// Weight of a point's own place beside its planes: makes places on flat parts unique and triangles there
-/// even.
+/// Weight of a point's own place relative to its planes: makes places on flat parts unique and triangles
+/// there even.
 const PLACE_WEIGHT: f64 = 1e-3;
 
 /// Collapses leave no triangle of a worse shape, unless it was worse before.
 const LEAST_SHAPE: f64 = 0.1;
 
-/// Triangles are put in again where as many times their number were put in.
+/// The search boxes are rebuilt once the insertions exceed the number of triangles by this factor.
 const PUT_IN: usize = 4;
 
 /// Condition to stop at.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fewer {
-    /// At this many triangles.
+    /// Stop at this many triangles.
     Triangles(usize),
-    /// Until the root mean square distance from the planes of a point exceeds this [m].
+    /// Stop when the root mean square distance from the planes of a point exceeds this [m].
     Distance(f64),
 }
 
@@ -73,14 +73,14 @@ impl Quadric {
     }
 }
 
-/// A collapse that was cheap when it was found.
+/// A collapse with its cost when it was found.
 struct Candidate {
     cost: f64,
-    /// The part of the planes.
+    /// The part of the planes in the cost.
     off: f64,
     edge: [u32; 2],
     position: Vector3,
-    /// Changes that its ends had seen.
+    /// Numbers of changes of its ends when it was found.
     changes: [u32; 2],
 }
 
@@ -133,8 +133,8 @@ impl TriangleMesh {
         Ok(Decimation::new(self).run(least, limit))
     }
 
-    /// The surface in each of some numbers of triangles, decreasing, or in a few more where nothing more can
-    /// collapse. From `uncrossed` triangles down collapses do not make triangles cross each other.
+    /// The surface in each of some numbers of triangles, decreasing, or in a few more if nothing more can
+    /// collapse. From `uncrossed` triangles down, collapses do not make triangles cross each other.
     pub(crate) fn decimated_to_each(mut self, numbers: &[usize], uncrossed: usize) -> Vec<Self> {
         let mut work = Decimation::new(&mut self);
         work.run(uncrossed.max(numbers.first().copied().unwrap_or(0)), f64::INFINITY);
@@ -263,8 +263,7 @@ impl<'m> Decimation<'m> {
         [a.inf(&b).inf(&c), a.sup(&b).sup(&c)]
     }
 
-    /// Puts in the triangles round a point, which have changed, or all if too many that have changed since
-    /// are there.
+    /// Inserts the changed triangles round a point. If too many old entries remain, all are inserted anew.
     fn place_round(&mut self, point: u32, count: usize) {
         let Some(mut placed) = self.placed.take() else { return };
         if placed.len() > PUT_IN * count {

@@ -188,7 +188,7 @@ impl TriangleMesh {
         Some(if free { reference.closest(&aim).0 } else { reference.closest_on_lines(&aim) })
     }
 
-    /// A place of a point beside the surface among evener triangles.
+    /// A place of a point near the surface among evener triangles.
     pub(crate) fn even_place(&self, point: u32) -> Option<Vector3> {
         if self.star[point as usize].is_empty() {
             return None;
@@ -224,7 +224,7 @@ mod tests {
     use crate::shapes::phantom::{Organ, Phantom};
 
     /// The liver phantom at 8 mm: mean shape above 0.9, no triangle below 0.4, edges near 8 mm. The distance
-    /// from the fine surface is that between chords of 8 mm and radii of 10 mm and more (h²/8r = 0.8 mm). At
+    /// from the fine surface is the sagitta of chords of 8 mm on radii of 10 mm and more (h²/8r = 0.8 mm). At
     /// the thin edge of the lobe, which has no marked line, triangles stay behind by up to an edge.
     #[test]
     fn a_liver_gets_even_triangles_and_keeps_its_shape() {

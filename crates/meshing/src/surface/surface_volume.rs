@@ -14,7 +14,7 @@ use crate::surface::triangles::TriangleMesh;
 use crate::tets::lost::{LostPart, Samples};
 use crate::tets::organ::LostReport;
 
-/// Corrections at most, and how near they come to the volume.
+/// Most corrections, and their relative tolerance of the volume.
 const STEPS: usize = 6;
 const ENOUGH: f64 = 1e-4;
 
@@ -104,7 +104,7 @@ impl TriangleMesh {
     pub fn keep_volume(&mut self, anatomy: &Anatomy<'_>) -> Option<SurfaceVolume> {
         let faces = self.len();
         let area: f64 = self.alive().map(|t| self.area(t)).sum();
-        // Of an equilateral triangle of the mean area.
+        // The edge of an equilateral triangle of the mean area.
         let edge = (4.0 / 3.0_f64.sqrt() * area / faces as f64).sqrt();
         let samples = Samples::of(anatomy, edge)?;
         let far = (edge / 2.0).max(anatomy.resolution());
@@ -134,7 +134,7 @@ impl TriangleMesh {
         })
     }
 
-    /// Volume within it [m³]; of an open surface without meaning.
+    /// Volume within it [m³]; meaningless for an open surface.
     pub(crate) fn volume(&self) -> f64 {
         let (points, triangles) = self.compact();
         signed_volume(&points, &triangles)

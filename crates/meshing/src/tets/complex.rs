@@ -35,7 +35,7 @@ pub const MOST_MATERIALS: usize = 127;
 /// No step makes an edge longer than this many lattice constants.
 pub(crate) const LONGEST: f64 = 1.6;
 
-/// Tets, points and how they hang together.
+/// Tets, points and their connections.
 #[derive(Clone)]
 pub(crate) struct Complex {
     pub(crate) points: Vec<Vector3>,
@@ -45,7 +45,7 @@ pub(crate) struct Complex {
     /// The tets round each point.
     pub(crate) star: Vec<Vec<u32>>,
     pub(crate) sides: Vec<Sides>,
-    /// Lattice constant round each point [m]: how long the edges there should be.
+    /// Lattice constant round each point [m]: the intended length of edges there.
     pub(crate) size: Vec<f64>,
 }
 
@@ -239,7 +239,7 @@ impl Complex {
         self.tets[tet as usize] = GONE;
     }
 
-    /// Halves an edge at `position`: every tet round it becomes two. The new point.
+    /// Halves an edge at `position`: every tet round it becomes two. Returns the new point.
     pub(crate) fn bisect(&mut self, [p, q]: [u32; 2], position: Vector3) -> u32 {
         let new = self.points.len() as u32;
         self.points.push(position);
@@ -268,8 +268,8 @@ impl Complex {
         new
     }
 
-    /// Puts a tet on each of some boundary faces, outward, with a new point at `position` as the apex; that
-    /// gets what `point` has.
+    /// Puts a tet on each of some boundary faces, outward. Their common apex is a new point at `position`
+    /// with the data of `point`.
     pub(crate) fn cap(&mut self, point: u32, faces: &[[u32; 3]], position: Vector3) {
         let apex = self.points.len() as u32;
         self.points.push(position);

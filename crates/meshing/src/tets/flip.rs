@@ -122,7 +122,7 @@ impl Complex {
         if inversions.count() % 2 == 0 { [nodes[k], nodes[l]] } else { [nodes[l], nodes[k]] }
     }
 
-    /// The triangulation of a ring whose worst tet with p or q is best, and the length of that.
+    /// The best triangulation of a ring by its worst tet with p or q, and the acoustic length of this tet.
     fn best_triangulation(&self, ring: &[u32], p: u32, q: u32) -> Option<(f64, Vec<[usize; 3]>)> {
         let n = ring.len();
         let mut best = [[f64::INFINITY; LONGEST_RING + 1]; LONGEST_RING + 1];

@@ -32,7 +32,7 @@ const MOST_CUBES: f64 = (1 << 27) as f64;
 
 /// The levels of a lattice of several sizes. Level 0 has the smallest cubes.
 pub(crate) struct Levels {
-    /// Fraction of the requested edge.
+    /// Level of cubes with the requested edge.
     pub(crate) base: usize,
     /// Level of the largest cubes inside.
     inner: usize,
@@ -59,8 +59,8 @@ impl Levels {
         Ok(Self { base, inner: base + doublings as usize, protected: protected.collect() })
     }
 
-    /// Wants smaller cubes round tears, at least halved ones and enough of them across the thin part; whether
-    /// any are.
+    /// Requests smaller cubes round tears: at least halved, and enough across the thin part. Returns whether
+    /// any were requested.
     pub(crate) fn close(
         &self,
         request: &OrganTets,
@@ -89,7 +89,7 @@ impl Levels {
     }
 }
 
-/// Cubes that must not be larger than their level, as found by measuring a mesh made before.
+/// Cubes that must not be larger than their level, found by measuring an earlier mesh.
 pub(crate) type Wanted = BTreeSet<(usize, Cube)>;
 
 /// A lattice over an anatomy, with cubes of the requested sizes.
@@ -197,12 +197,12 @@ fn protect(tree: &mut Octree, anatomy: &Anatomy<'_>, label: i32, level: usize) -
     Ok(())
 }
 
-/// The tets of a lattice inside the body, and how many cells and pieces of it were left out as too small.
+/// The tets of a lattice inside the body, and the numbers of cells and pieces left out as too small.
 pub(crate) struct Filled {
     pub(crate) complex: Complex,
     pub(crate) dropped_pieces: usize,
     pub(crate) dropped_cells: usize,
-    /// Tears of thin parts, and how many smaller cells closed.
+    /// Remaining tears of thin parts, and the number of tears that smaller cells closed.
     pub(crate) tears: Vec<Tear>,
     pub(crate) closed_tears: usize,
 }

@@ -15,12 +15,12 @@ const CLEARANCE: f64 = 0.04;
 
 /// Faces of the boundary by place.
 pub(crate) struct Guard {
-    /// Faces, outward; those that are gone stay in the list.
+    /// Faces, outward; removed ones stay in the list.
     faces: Vec<[u32; 3]>,
     is_gone: Vec<bool>,
     /// Numbers of faces by their sorted nodes.
     numbers: HashMap<[u32; 3], u32>,
-    /// Numbers of the faces round each point; some are gone.
+    /// Numbers of the faces round each point; some are removed.
     round: Vec<Vec<u32>>,
     boxes: Boxes,
 }
@@ -56,7 +56,7 @@ impl Guard {
         self.boxes.insert(number, box_of(face.map(|node| complex.points[node as usize])));
     }
 
-    /// Takes note of how points moved and of new faces round them.
+    /// Records the new positions of points and the new faces round them.
     pub(crate) fn note(&mut self, complex: &Complex, points: &[u32]) {
         self.round.resize(complex.points.len(), Vec::new());
         for &point in points {
@@ -201,7 +201,7 @@ mod tests {
     use super::*;
     use pliant_testing::Random;
 
-    /// Compared with the nearest of many points of each.
+    /// Comparison with the nearest of many points of each.
     #[test]
     fn distances_of_triangles_are_those_of_their_nearest_points() {
         let mut random = Random::new(3);

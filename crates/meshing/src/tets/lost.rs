@@ -15,7 +15,7 @@ use crate::tets::complex::Complex;
 /// Steps of the grid along an edge of the cells inside triangles.
 const STEPS_PER_EDGE: f64 = 8.0;
 
-/// Samples of a box at most.
+/// Most samples of a box.
 const MOST_SAMPLES: f64 = (1 << 23) as f64;
 
 /// Parts of a voxel up to this one come from rounding.
@@ -63,8 +63,8 @@ impl Samples {
         }
     }
 
-    /// Inside triangles, on a grid of `step` [m] or more. Rows along x are cut at the triangles, so parts
-    /// thinner than a step count with their volume on average.
+    /// Samples the inside of triangles, on a grid of `step` [m] or more. Rows along x are cut at the
+    /// triangles, so parts thinner than a step count with their volume on average.
     fn within(points: &[Vector3], triangles: &[[u32; 3]], step: f64) -> Option<Self> {
         let start = *points.first()?;
         let (low, high) = points.iter().fold((start, start), |(low, high), x| (low.inf(x), high.sup(x)));
@@ -171,7 +171,7 @@ impl Samples {
         covered
     }
 
-    /// The parts with samples farther than `far` [m] from those that a mesh holds, the largest first.
+    /// The parts with samples farther than `far` [m] from the samples in the mesh, the largest first.
     pub(crate) fn lost(&self, covered: &[bool], far: f64) -> Vec<LostPart> {
         let is_lost = |at: usize| self.materials[at] > 0 && !covered[at];
         let distances = self.distances(covered);

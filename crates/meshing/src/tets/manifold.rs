@@ -122,7 +122,7 @@ pub(crate) fn pinched_points(complex: &Complex) -> Vec<u32> {
     (0..complex.points.len() as u32).filter(outer).filter(|&point| fans(complex, point).len() > 1).collect()
 }
 
-/// Boundary faces round a point, outward, in groups that hang together through edges at the point.
+/// Boundary faces round a point, outward, in groups that are connected through edges at the point.
 fn fans(complex: &Complex, point: u32) -> Vec<Vec<[u32; 3]>> {
     let mut rest = complex.rim_of(point, |_| true);
     let meet = |a: &[u32; 3], b: &[u32; 3]| a.iter().any(|node| *node != point && b.contains(node));
@@ -171,7 +171,7 @@ fn part_pinch(complex: &mut Complex, point: u32) -> bool {
     true
 }
 
-/// Takes a point off with the near thirds of its tets, which joins what its fans bound.
+/// Removes a point with the near thirds of its tets, which joins the spaces that its fans bound.
 fn dig(complex: &mut Complex, point: u32) {
     for other in complex.neighbours(point) {
         let place = complex.points[point as usize].lerp(&complex.points[other as usize], DUG);
@@ -195,7 +195,7 @@ pub(crate) fn crowded_edges(complex: &Complex) -> Vec<[u32; 2]> {
     edges.into_iter().filter(|(_, count)| *count > 2).map(|(edge, _)| edge).collect()
 }
 
-/// Doubles the points whose tets fall into groups; how many points that adds.
+/// Doubles the points whose tets fall into groups. Returns the number of points added.
 fn double_points(complex: &mut Complex, points: std::ops::Range<u32>) -> usize {
     let mut added = 0;
     for point in points {
@@ -220,7 +220,7 @@ fn double_points(complex: &mut Complex, points: std::ops::Range<u32>) -> usize {
     added
 }
 
-/// Tets round a point in groups that hang together through faces with the point; the group of the first tet
+/// Tets round a point in groups that are connected through faces with the point; the group of the first tet
 /// first.
 fn groups(complex: &Complex, point: u32) -> Vec<Vec<u32>> {
     let star = &complex.star[point as usize];
@@ -275,8 +275,7 @@ mod tests {
         }
     }
 
-    /// A ring of tets round an edge with two of them taken out opposite each other: its ends hold the halves
-    /// together.
+    /// A ring of tets round an edge without two opposite ones: its ends hold the halves together.
     #[test]
     fn an_edge_between_halves_that_hang_together_elsewhere_is_halved() {
         let around = |at: usize| {

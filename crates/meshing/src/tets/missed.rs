@@ -119,7 +119,7 @@ impl Missed {
             let surface = boundary(mesh);
             let faces: Vec<u32> = (0..surface.faces.len() as u32).collect();
             let rim = SurfaceLocator::new(&surface, &faces, &mesh.points);
-            // By how much the mesh misses the middle of a way.
+            // Distance by which the mesh misses the middle of a way.
             let by = |way: &ThinWay| {
                 let covered = locator.locate(way.middle).is_some_and(|found| found.distance == 0.0);
                 let far =
@@ -204,7 +204,7 @@ impl fmt::Display for Missed {
 struct ThinWay {
     middle: Vector3,
     length: f64,
-    /// Through the body; else through the background.
+    /// True through the body, false through the background.
     inside: bool,
 }
 

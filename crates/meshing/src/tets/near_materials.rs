@@ -1,6 +1,6 @@
-//! The materials near a point of a body made of voxels. Each field of theirs is a signed distance that is
-//! positive in a box; where the box is far, the point is in another material. Without it, cutting out n
-//! materials takes n² fields at each point.
+//! The materials near a point of a body made of voxels. The field of each material is a signed distance that
+//! is positive only within a box. Where this box is far, the point is in another material. Without this
+//! search, cutting out n materials takes n² fields at each point.
 
 use pliant_geometry::Vector3;
 

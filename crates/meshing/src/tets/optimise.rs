@@ -24,7 +24,7 @@ const AIM: f64 = 1.07;
 /// The threshold reaches its goal in this part of the rounds.
 const RAMP: f64 = 0.6;
 
-/// Sweeps over the points in a round, and by how much trial moves shrink from one to the next.
+/// Sweeps over the points in a round, and the factor by which trial moves shrink from sweep to sweep.
 const SWEEPS: usize = 3;
 const SHRINK: f64 = 0.6;
 
@@ -63,7 +63,7 @@ pub struct Steps {
     pub rounds: usize,
     /// Tets taken off the boundary.
     pub peeled: usize,
-    /// Flat tets between materials given to the other one.
+    /// Flat tets between materials moved to the other material.
     pub given: usize,
     /// Edges collapsed.
     pub collapsed: usize,
@@ -81,7 +81,7 @@ pub(crate) struct Optimiser<'a> {
     slack: f64,
     /// True if points where three materials meet, or two and the outside, only keep to the outside.
     lines_are_free: bool,
-    /// Rejects what would let the boundary intersect itself, if it is there.
+    /// Rejects changes that would let the boundary intersect itself, if present.
     guard: Option<Guard>,
     noise: u64,
     done: Steps,
@@ -103,7 +103,7 @@ impl<'a> Optimiser<'a> {
         self.note(&[node]);
     }
 
-    /// Takes note of changes round points.
+    /// Records changes round points.
     fn note(&mut self, nodes: &[u32]) {
         if let Some(guard) = &mut self.guard {
             guard.note(self.complex, nodes);
@@ -150,7 +150,7 @@ impl<'a> Optimiser<'a> {
         self.done
     }
 
-    /// Shifts the surfaces whose volume is off, and their points with them; whether any was.
+    /// Shifts the surfaces whose volume is off, together with their points. Returns whether any was shifted.
     fn shift_surfaces(&mut self, volumes: &[Option<f64>], target: f64) -> bool {
         let measured = measure(self.complex, self.surfaces.materials());
         let mut shifted = 0;
@@ -326,7 +326,7 @@ impl<'a> Optimiser<'a> {
         let mut collapsed = 0;
         for tet in self.below(threshold) {
             let nodes = self.complex.tets[tet as usize];
-            // A collapse before may have taken it away or improved it.
+            // An earlier collapse may have removed or improved the tet.
             if self.complex.is_alive(tet)
                 && self.complex.part(tet) < threshold
                 && self.collapse_one(nodes, threshold)
@@ -418,13 +418,12 @@ impl<'a> Optimiser<'a> {
         best.map(|(_, place)| place)
     }
 
-    /// Parts of the ideal length that a node at `place` is responsible for: the least of its tets, and its
-    /// own.
+    /// Parts of the ideal length of a node at `place`: the least of its tets, and its nodal length.
     fn parts_round(&self, node: u32, place: &Vector3) -> [f64; 2] {
         [self.star_min(node, place, u32::MAX, 0.0), self.nodal_part(node, place)]
     }
 
-    /// The length that a node would bear on its own at `place`, as a part of the ideal one.
+    /// Nodal acoustic length of a node at `place`, as a part of the ideal one.
     fn nodal_part(&self, node: u32, place: &Vector3) -> f64 {
         self.complex.nodal_length(node, place) / self.complex.ideal([node; 4])
     }
@@ -479,7 +478,7 @@ impl<'a> Optimiser<'a> {
     }
 
     /// Slides points along their surface to where its facets follow the field best, as long as no tet falls
-    /// below the target; `reach` in lattice constants. What falls short of a crest moves onto it.
+    /// below the target; `reach` is in lattice constants. Points that fall short of a crest move onto it.
     fn fit(&mut self, target: f64, reach: f64) {
         for node in 0..self.complex.points.len() as u32 {
             if self.complex.sides[node as usize].count_ones() == 2 {
@@ -571,7 +570,7 @@ impl<'a> Optimiser<'a> {
         let (mut best, mut place) = (now, here);
         let look = OnceCell::new();
         for trial in std::iter::once(half_way).chain(directions().map(|direction| here + direction * reach)) {
-            // Free trials without improvement are not worth projecting: their tets change little.
+            // Each trial is projected between the sides of the node, and must then improve the worst tet.
             if let Some(trial) = self.project_from(node, trial, &look) {
                 let part = self.star_min(node, &trial, u32::MAX, best);
                 if part > best

@@ -65,7 +65,7 @@ pub(crate) fn tears(complex: &Complex, field: &dyn ImplicitField) -> Vec<Tear> {
     tears
 }
 
-/// Faces of the boundary that cut through the body, in groups that hang together by edges.
+/// Faces of the boundary that cut through the body, in groups that are connected by edges.
 fn cuts(complex: &Complex, field: &dyn ImplicitField) -> Vec<Vec<[u32; 3]>> {
     let is_cut = |face: &[u32; 3]| {
         let corners = face.map(|node| complex.points[node as usize]);
@@ -149,7 +149,7 @@ fn edges(&[a, b, c]: &[u32; 3]) -> [[u32; 2]; 3] {
     [key(a, b), key(b, c), key(c, a)]
 }
 
-/// Faces in groups that hang together by edges, in the order of their first faces.
+/// Faces in groups that are connected by edges, in the order of their first faces.
 fn groups(faces: &[[u32; 3]]) -> Vec<Vec<[u32; 3]>> {
     let mut of_edge: BTreeMap<[u32; 2], Vec<usize>> = BTreeMap::new();
     for (number, face) in faces.iter().enumerate() {

@@ -197,7 +197,7 @@ fn find(root: &mut [u32], mut cell: u32) -> u32 {
     cell
 }
 
-/// Boundary edges of the kept cells with other than two boundary faces.
+/// Boundary edges of the kept cells with a number of boundary faces other than two.
 fn non_manifold_edges(kind: CellKind, cells: &[u32], faces: &[u128], kept: impl Fn(usize) -> bool) -> usize {
     let local = local_faces(kind);
     let n = kind.node_count();

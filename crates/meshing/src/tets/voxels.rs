@@ -54,7 +54,8 @@ impl Voxels {
         Ok(made)
     }
 
-    /// The cubes with more than `least` of a measure at their centres, and its values.
+    /// Makes the cubes with more than `least` of a measure at their centres. Also returns the values of the
+    /// measure.
     fn fill(
         &self,
         field: &(impl ImplicitField + ?Sized),
@@ -115,7 +116,7 @@ fn finite(field: &(impl ImplicitField + ?Sized), point: &Vector3) -> Result<f64,
     if value.is_finite() { Ok(value) } else { Err(MeshingError::FieldNotFinite { value, point: *point }) }
 }
 
-/// Cells that cover a length; a millionth of a cell too many is no cell.
+/// Number of cells that cover a length; an excess of a millionth of a cell adds none.
 fn count_along(length: f64, edge: f64) -> usize {
     ((length / edge - 1e-6).ceil() as usize).max(1)
 }

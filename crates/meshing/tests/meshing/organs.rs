@@ -81,7 +81,7 @@ fn many_labels_keep_three_quarters_of_the_ideal_step() {
     assert!(made.report.acoustic_part >= 0.75, "{}", made.report);
 }
 
-/// A hundred labels side by side, four cells wide: each has its cells in its place, with about its volume.
+/// A hundred labels side by side, four cells wide. Each has its cells in its place, with about its volume.
 #[test]
 #[ignore = "slow: a minute"]
 fn a_hundred_labels_are_as_many_materials() {
@@ -356,7 +356,7 @@ fn boundaries_of_cubes_and_triangles_are_checked() {
     let surface = TriangleMesh::of_field(&wall, 0.001, usize::MAX).unwrap().to_mesh();
     let check = SurfaceCheck::of(&surface);
     assert_eq!((check.euler_number, check.self_intersections, check.doubt()), (4, 0, None));
-    // A piece of it that is moved passes through the rest.
+    // A moved piece of the surface passes through the rest.
     let mut moved = surface.clone();
     moved.points.iter_mut().filter(|x| x.norm() > 0.0285).for_each(|x| x.x += 0.004);
     let check = SurfaceCheck::of(&moved);

@@ -28,8 +28,8 @@ fn skin(mesh: &Mesh) -> TriangleMesh {
     TriangleMesh::from_mesh(&skin).expect("a surface").0
 }
 
-/// The field of cells of 8 mm loses most of the spike, and the mesh follows the field. The report used to
-/// give its distance from the field.
+/// The field of cells of 8 mm loses most of the spike, and the mesh follows the field. The report must give
+/// the distance from the triangles.
 #[test]
 fn tets_of_a_surface_are_measured_to_its_triangles() {
     let edge = 0.008;
@@ -179,7 +179,7 @@ fn a_distance_is_held_or_the_best_so_far_is_told() {
         made.report
     );
     assert!(truth.largest() < 1.53e-3, "{truth:?}");
-    // A warning names the spike, which costs most of the step, and there is no other.
+    // A warning names the spike, which costs most of the step. It is the only warning.
     let doubts = made.report.doubts();
     assert!(doubts.len() == 1 && doubts[0].contains("make the step"), "{doubts:?}");
     // Few cells are allowed.
