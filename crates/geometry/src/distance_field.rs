@@ -49,7 +49,7 @@ impl DistanceField {
         self.gradient_of(&values, &part)
     }
 
-    /// Both, for little more than one.
+    /// The value and the gradient, for little more than the cost of one.
     pub fn value_and_gradient(&self, point: &Vector3) -> (f64, Vector3) {
         let index = self.grid.index(point);
         let within = self.clamped(&index);
@@ -84,7 +84,7 @@ impl DistanceField {
         self.grid.gradient(&gradient)
     }
 
-    /// Smallest and largest corner of a box round all that is inside [m].
+    /// Smallest and largest corner of a box round the inside [m].
     pub fn bounds(&self) -> [Vector3; 2] {
         self.bounds
     }

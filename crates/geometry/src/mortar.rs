@@ -28,9 +28,9 @@ use rstar::{AABB, RTree, primitives::GeomWithData, primitives::Rectangle};
 
 use crate::{CellKind, Face, Vector3};
 
-/// Faces whose normals are nearer than this to the same direction, as a cosine, do not lie on each other.
+/// Largest cosine between the normals of two faces that lie on each other.
 const FACING: f64 = -0.5;
-/// Segments of less than this part of a face are round-off.
+/// Segments below this part of a face are round-off.
 const SLIVER: f64 = 1e-10;
 /// Weights below this are round-off.
 const TINY: f64 = 1e-15;

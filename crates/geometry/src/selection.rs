@@ -283,7 +283,7 @@ impl Selection {
         }
     }
 
-    /// Unions, intersections and differences of what `leaf` says of the other selections.
+    /// Combines the results of `leaf` for the other selections in unions, intersections and differences.
     fn evaluate(&self, leaf: &dyn Fn(&Self) -> Indices) -> Indices {
         self.check()?;
         let Some(parts) = self.parts() else { return leaf(self) };

@@ -11,7 +11,7 @@ use crate::error::LabelError;
 use crate::image::{Image, LabelImage};
 use crate::names::LabelChoice;
 
-/// Voxels of a box from which on it is resampled, 322³. Fields of it take some 20 bytes a voxel.
+/// Most voxels of a box without resampling, 322³. Its fields take some 20 bytes a voxel.
 const MOST_VOXELS: usize = 1 << 25;
 
 /// The part of an image that is the body.
@@ -80,7 +80,8 @@ impl Image {
         Ok(Choice::Labels(chosen))
     }
 
-    /// Gives the voxels of each group of labels the number of its first one, and that its name.
+    /// Gives the voxels of each group of labels the number of its first label, and this label the name of the
+    /// group.
     fn merge(&mut self, groups: Vec<(&String, Vec<i32>)>) {
         let mut first_of = BTreeMap::new();
         for (name, labels) in groups {
@@ -106,7 +107,7 @@ impl Image {
         }
     }
 
-    /// The labels of a choice that reach the border of the image, each with where.
+    /// The labels of a choice that reach the border of the image, each with its voxels there.
     pub fn border(&self, choice: &Choice) -> Vec<(i32, Border)> {
         let labels: &[i32] = match choice {
             Choice::Labels(labels) => labels,
@@ -135,7 +136,7 @@ impl Image {
         borders
     }
 
-    /// The label of a voxel if it belongs to a choice, and else 0.
+    /// The label of a voxel if it belongs to a choice, otherwise 0.
     fn chosen(&self, choice: &Choice, at: usize) -> i32 {
         match choice {
             Choice::Labels(labels) => {

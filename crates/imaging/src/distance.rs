@@ -245,7 +245,7 @@ fn matching_shift(values: impl Iterator<Item = f32> + Clone, volume: f64, grid: 
         let parts = near.iter().map(|f| (0.5 + (f - shift) / step).clamp(0.0, 1.0));
         (deep + parts.sum::<f64>()) * grid.voxel_volume()
     };
-    // Within a voxel either way: what needs more is a region that smoothing tore apart.
+    // The shift is within a voxel either way. Only a region that smoothing tore apart needs more.
     let (mut low, mut high) = (-step, step);
     for _ in 0..50 {
         let middle = (low + high) / 2.0;

@@ -299,7 +299,7 @@ pub enum LabelError {
         /// The operation that removed the last voxel.
         operation: &'static str,
     },
-    /// A length that must be positive and finite.
+    /// A length that is negative, too large or not finite.
     #[error("{what} is {value}; it must be finite and not negative")]
     BadLength {
         /// Name of the length.

@@ -114,11 +114,11 @@ impl Numbers {
     }
 }
 
-/// Labels scaled by a single-precision slope miss whole numbers by this at most, in the usual numbers of
-/// labels.
+/// Largest distance of labels from whole numbers after scaling by a single-precision slope, for usual label
+/// numbers.
 const ROUND_OFF: f64 = 1e-4;
 
-/// Labels that a program interpolated between equal ones miss whole numbers by this at most.
+/// Largest distance of labels from whole numbers after interpolation between equal labels.
 const INTERPOLATED: f64 = 0.05;
 
 /// Different values that are counted; a scan may have more.

@@ -195,8 +195,8 @@ impl Components {
         sizes
     }
 
-    /// Components that are at least in one row: the first run of the largest one (of equals the first), and
-    /// how many.
+    /// Returns the first run of the largest component (the first among equals) and the number of components;
+    /// `None` without components.
     pub(crate) fn largest(&self) -> Option<(u32, usize)> {
         let sizes = self.sizes();
         let count = sizes.iter().filter(|&&size| size > 0).count();

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use crate::image::{Image, Numbers, Order, Scalar};
 
-/// Ways into the organ of a voxel that is inside, of 26.
+/// Least number of ways into the organ, of 26, of a voxel inside.
 const INSIDE: usize = 14;
 
 impl Image {
@@ -47,7 +47,7 @@ impl Image {
                 return (own, Some(false));
             }
             let count = |label: i32| found.iter().filter(|&&own| own == label).count();
-            // Of equals the first of the organ's.
+            // Among equals, the first label of the organ wins.
             let most = organ.iter().rev().max_by_key(|&&label| count(label));
             (most.copied().unwrap_or(own), Some(true))
         };

@@ -142,7 +142,7 @@ fn members(set: XmlElement<'_>, all: usize) -> Result<Vec<u32>, Fault> {
     }
 }
 
-/// The membrane of a set, still without triangles; `None` of one that bends, which is left out.
+/// The membrane of a set, still without triangles; `None` if it bends, which is left out.
 fn without_faces(set: XmlElement<'_>, remarks: &mut Remarks) -> Result<Option<Membrane>, Fault> {
     let line = line(set);
     let material = needed(set, "Material", MATERIAL)?;
@@ -159,7 +159,7 @@ fn without_faces(set: XmlElement<'_>, remarks: &mut Remarks) -> Result<Option<Me
     Ok(Some(Membrane { line, law, density, thickness, faces: Vec::new() }))
 }
 
-/// The law of a material; `None` of one that bends.
+/// The law of a material; `None` if it bends.
 fn law(of: XmlElement<'_>) -> Result<Option<MembraneLaw>, Fault> {
     let known = "Linear, NeoHookean, LinearShell, LinearThickShell";
     let name = attribute(of, "Type", "Type=\"Linear\" or \"NeoHookean\"")?;

@@ -17,7 +17,7 @@ pub(super) struct Touching {
     names: Vec<String>,
     /// True for each thing that touches nodes on the boundary of a body.
     met: Vec<bool>,
-    /// Names of the bodies, and of how many pieces they are.
+    /// Names of the bodies, and their numbers of pieces.
     bodies: Vec<(String, usize)>,
     /// True if there are several bodies.
     several: bool,
@@ -125,7 +125,7 @@ impl Touching {
     }
 }
 
-/// Friction and distance of a contact, and an empty line. Bodies that keep none say so.
+/// Friction and distance of a contact, and an empty line. The distance is left out if it is not given.
 fn how(friction: f64, thickness: Option<f64>) -> String {
     let mut lines = format!("friction = {friction:?}\n");
     if let Some(thickness) = thickness {

@@ -9,8 +9,7 @@ use super::geometry::Solid;
 use super::material::Material;
 use super::system::System;
 
-/// Most pairs by which the curve HILLY is written: one for each step, or straight lines with an error of at
-/// most 1e-5.
+/// Most pairs of the written curve HILLY: one for each step, or straight lines with an error of at most 1e-5.
 const HILLY_POINTS: f64 = 2000.0;
 /// π as NiftySim has it, in the curve HILLY.
 #[expect(clippy::approx_constant, reason = "NiftySim's")]

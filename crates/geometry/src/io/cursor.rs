@@ -1,5 +1,5 @@
-//! A place that moves through the bytes of a file: words of text, lines, and blocks of binary numbers.
-//! Every count is held against the bytes that are left before anything is allocated.
+//! A reader that moves through the bytes of a file: words of text, lines, and blocks of binary numbers. Every
+//! count is compared with the remaining bytes before anything is allocated.
 
 use std::fmt::{self, Display};
 use std::str::FromStr;
@@ -95,9 +95,9 @@ pub(super) struct Cursor<'a> {
     bytes: &'a [u8],
     at: usize,
     line: usize,
-    /// A binary block was read: lines mean nothing any more, bytes do.
+    /// True after a binary block: positions are then given in bytes, not lines.
     binary: bool,
-    /// The cursor moves in one line only, which is here in the file.
+    /// Place in the file of the only line that the cursor moves in.
     only_line: Option<Place>,
 }
 

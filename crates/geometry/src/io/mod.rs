@@ -311,14 +311,14 @@ const UNFINISHED: &str = ".tmp";
 fn unfinished(path: &Path) -> io::Result<fs::File> {
     loop {
         let file = match fs::File::create_new(path) {
-            // Of a killed process that had the same number.
+            // Left by a killed process that had the same number.
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
                 fs::remove_file(path)?;
                 continue;
             }
             made => made?,
         };
-        // A file system without locks has nothing removed from it, either.
+        // Without locks, no unfinished file is removed either.
         let _ = file.lock();
         if path.exists() {
             return Ok(file);
@@ -326,11 +326,11 @@ fn unfinished(path: &Path) -> io::Result<fs::File> {
     }
 }
 
-/// Removes what killed processes left of a file of this name: unfinished files that nobody holds.
+/// Removes unfinished files of this name that no process holds: killed processes left them.
 fn remove_left_over(path: &Path, name: &OsStr) {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let start = format!(".{}.", name.to_string_lossy());
-    // Whatever can't be listed or removed stays; the file itself is written all the same.
+    // Files that can't be listed or removed stay; the file itself is written all the same.
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let found = entry.file_name().to_string_lossy().into_owned();
         let number = found.strip_prefix(&start).and_then(|rest| rest.strip_suffix(UNFINISHED));

@@ -10,7 +10,7 @@ use super::vtk_cells::{Connectivity, PolyList, add_grid, add_poly};
 use super::{Format, MeshFile};
 use crate::{DataArray, Vector3};
 
-/// Whose data the attributes are.
+/// Owner of the attributes: points or cells.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Owner {
     Points,

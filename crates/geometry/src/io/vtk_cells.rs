@@ -119,7 +119,7 @@ impl Connectivity {
     }
 }
 
-/// The kind of polygonal data: which list of a poly-data file the cells are from.
+/// List of a poly-data file that cells are from.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum PolyList {
     Vertices,

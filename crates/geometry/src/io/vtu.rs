@@ -75,8 +75,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
     Ok(file)
 }
 
-/// Cuts appended data, which need not be XML, out of the file: the XML without them, and they with the place
-/// where they begin.
+/// Cuts appended data, which need not be XML, out of the file. Returns the XML without them, and the appended
+/// data with their place.
 fn split_appended(bytes: &[u8]) -> Result<(Bytes<'_>, Option<Appended<'_>>), Fault> {
     const TAG: &[u8] = b"<AppendedData";
     let mut opened = bytes.iter().enumerate().filter(|(_, byte)| **byte == b'<').map(|(at, _)| at);

@@ -153,7 +153,7 @@ impl Parts {
 
     fn array(&mut self, kind: &str, name: &str, components: usize, raw: &[u8]) -> io::Result<()> {
         let name = escaped(name);
-        // Of real numbers some arrays are not worth compressing.
+        // Arrays of real numbers are compressed only where that pays.
         let repeats: fn(&[u8]) -> bool = match kind {
             "Float32" => repeats::<4>,
             "Float64" => repeats::<8>,
@@ -205,7 +205,7 @@ impl Parts {
         }
     }
 
-    /// Indices below `limit`, as narrow as VTK reads them well.
+    /// Writes indices below `limit` in the narrowest type that VTK reads well.
     fn indices(&mut self, name: &str, indices: impl Iterator<Item = usize>, limit: usize) -> io::Result<()> {
         if i32::try_from(limit).is_ok() {
             let raw = bytes(indices.map(|index| (index as i32).to_le_bytes()));

@@ -17,7 +17,7 @@ const HEADER_LIMIT: u64 = 1 << 22;
 /// Bytes of the pieces in which voxels are read, with progress reported after each.
 const PIECE: u64 = 1 << 24;
 
-/// A place that moves through the bytes of a file.
+/// Reader of the bytes of a file.
 pub(super) struct Input<'a> {
     bytes: Box<dyn BufRead + 'a>,
     /// The file, where its neighbours may be read.
@@ -31,7 +31,7 @@ pub(super) struct Input<'a> {
     header_left: u64,
     /// Bytes that voxels may take.
     limit: u64,
-    /// Hears which part of the voxels is read.
+    /// Receives the part of the voxels that is read.
     progress: &'a dyn Fn(f64),
 }
 
@@ -64,7 +64,7 @@ impl<'a> Input<'a> {
         }
     }
 
-    /// From now on neighbours are read in this folder only.
+    /// Restricts the reading of other files to this folder.
     pub(crate) fn stay_within(&mut self, folder: Option<PathBuf>) {
         self.within = folder;
     }

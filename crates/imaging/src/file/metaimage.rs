@@ -192,7 +192,7 @@ impl MetaImageHeader {
             .map_err(|flat| ImageProblem::from(flat).at_line(line))
     }
 
-    /// Metres a unit of length.
+    /// Metres per unit of length.
     fn unit(&self) -> Result<f64, Fault> {
         match self.get("DistanceUnits").map(|field| (field, field.value.as_str())) {
             None | Some((_, "mm" | "?" | "")) => Ok(1e-3),

@@ -145,7 +145,7 @@ impl Fault {
     }
 }
 
-/// Refuses a file that really lies outside a folder.
+/// Rejects a file that lies outside a folder, with links resolved.
 fn check_within(path: &Path, folder: Option<&Path>) -> io::Result<()> {
     match folder {
         Some(folder) if !path.canonicalize()?.starts_with(folder) => {

@@ -240,7 +240,7 @@ impl NiftiHeader {
         }
     }
 
-    /// Metres a unit of length; unknown units are taken as millimetres.
+    /// Metres per unit of length; unknown units are taken as millimetres.
     fn unit(&self, notes: &mut Vec<String>) -> f64 {
         let code = if self.version == 1 { self.bytes[123].into() } else { self.integer(0, 500, 4) };
         match code & 7 {
