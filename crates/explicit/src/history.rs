@@ -1,4 +1,4 @@
-//! What relaxing laws remember.
+//! History of relaxing laws.
 
 use pliant_mechanics::model::Solid;
 use pliant_mechanics::tensor::Symmetric;
@@ -7,12 +7,13 @@ use serde::{Deserialize, Serialize};
 use crate::lanes::LaneNumber;
 use crate::lanes::{PACK, Pack};
 
-/// What a relaxing law remembers of a solid.
+/// History of the relaxing law of a solid.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct History<R> {
     /// For each pack of cells [`History::slots`] tensors of six packs.
     pub cells: Vec<Pack<R>>,
-    /// Where pressures are averaged, for each pack of them: Φⁿ⁻¹ and one h per volumetric term.
+    /// For each pack of averaged pressures: Φⁿ⁻¹ and one h per volumetric term. Empty if pressures are not
+    /// averaged.
     pub pressures: Vec<Pack<R>>,
 }
 
@@ -49,7 +50,7 @@ impl<R: LaneNumber> History<R> {
         }
     }
 
-    /// What an averaged pressure remembers [Pa].
+    /// Returns the history [Pa] of an averaged pressure.
     pub(crate) fn of_pressure(&self, solid: &Solid, index: usize) -> Vec<f64> {
         let slots = solid.material.prony.volumetric_slots();
         (0..slots).map(|slot| self.pressures[index / PACK * slots + slot].0[index % PACK].to_f64()).collect()

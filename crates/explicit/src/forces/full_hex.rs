@@ -1,5 +1,6 @@
 //! Hexahedra with 2×2×2 Gauss points for the change of shape and one mean dilatation, W = Σ w W_iso(F_g) + V
-//! U(v/V): no hourglass patterns, no locking, eight stresses a cell. The in-house reference for `hex8`.
+//! U(v/V). They have no hourglass patterns and no locking, and take eight stresses a cell. The in-house
+//! reference for `hex8`.
 
 use pliant_mechanics::element::GaussPoints;
 use pliant_mechanics::law::AnyLaw;
@@ -19,7 +20,7 @@ use crate::relaxation::Relaxation;
 
 pub(super) type FullHexes<R> = OnePass<R, FullHexConstants<R>>;
 
-/// What does not change from step to step.
+/// Constants of the elements from step to step.
 pub(super) struct FullHexConstants<R> {
     law: AnyLaw,
     cells: PackedCells<R, 8>,
