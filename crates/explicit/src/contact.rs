@@ -1,6 +1,6 @@
 //! Contacts in a step. Nodes are predicted, then impulses keep them, and points between them, apart from
 //! rigid things, other bodies and other parts of their own body. A point pair x = Σ cᵢ xᵢ with normal n and
-//! gap g is a row with impulses cᵢ λ n on its nodes: λ ≥ 0, g ≥ 0 and λ g = 0. Friction adds impulses of at
+//! gap g is a row. Its nodes get impulses cᵢ λ n with λ ≥ 0, g ≥ 0 and λ g = 0. Friction adds impulses of at
 //! most μ λ against the slip. Projected Gauss–Seidel finds them, in the order of the rows: momentum is kept
 //! to the last bit of each impulse. A last pass over nodes alone keeps these out of curved rigid things, too.
 

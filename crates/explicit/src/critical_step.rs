@@ -203,8 +203,8 @@ fn limit_if_enough<R: LaneNumber>(
     (limit >= enough).then_some(limit)
 }
 
-/// True if one-sided differences suffice. Fibres have two slopes where they are slack, and searches across
-/// walls end at a tolerance.
+/// True if one-sided differences suffice, as there are no fibres and no searches across walls. Fibres have
+/// two slopes where they are slack.
 fn is_smooth(model: &Model) -> bool {
     !has_search_across(model) && model.solids.iter().all(|solid| solid.material.law.is_isotropic())
 }
@@ -509,9 +509,9 @@ mod tests {
         }
     }
 
-    /// Both eigenvalues are right to the tolerance, so the steps differ by half of it, and slopes on one side
-    /// add a little. A rough eigenvalue is at most [`ROUGH`] too large, as its residual is counted in, and
-    /// its other error is less than the reserve of `RESERVE`. Single precision adds 1e-3 at most.
+    /// Both eigenvalues are right to the tolerance, so the steps differ by half the tolerance, and slopes on
+    /// one side add a little. A rough eigenvalue is at most [`ROUGH`] too large, as its residual is counted
+    /// in. Its other error is less than the reserve of `RESERVE`. Single precision adds 1e-3 at most.
     #[test]
     fn the_limit_of_a_run_is_the_critical_time_step() {
         of_deformed_cubes(|name, model, displacement| {

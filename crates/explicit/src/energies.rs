@@ -13,13 +13,12 @@ pub fn balance_floor<R: LaneNumber>() -> f64 {
     (R::EPSILON * 10.0).max(1e-9)
 }
 
-/// A run whose energies are off by more than this fraction of the largest one ends …
+/// A run ends if its energies are off balance by more than this fraction of the largest one …
 pub const BALANCE_LIMIT: f64 = 0.05;
 
-/// … once they are so for this many steps in a row. A shock unbalances the few steps in which the struck
-/// nodes move but their stress wave is not yet resolved. A stable vibration with more than 5 % of its energy
-/// in the step error (ωΔt > 0.45) passes through zero every seventh step. Only a growing vibration stays off
-/// balance.
+/// … for this many steps in a row. A shock unbalances the few steps in which the struck nodes move but their
+/// stress wave is not yet resolved. A stable vibration with more than 5 % of its energy in the step error
+/// (ωΔt > 0.45) passes through zero every seventh step. Only a growing vibration stays off balance.
 pub const BALANCE_STEPS: u32 = 20;
 
 /// Sums over the nodes at one instant [J], [W].

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::forces::Deformed;
 use crate::substeps::margin;
 
-/// Checks are made where the deformation has changed by this factor since the last one …
+/// A check is made once the deformation has changed by this factor since the last check …
 const CALM: f64 = 1.02;
 /// … or after this number of steps.
 const LONGEST: u64 = 1000;

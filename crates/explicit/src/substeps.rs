@@ -8,12 +8,12 @@ pub(crate) const RESERVE: f64 = 0.95;
 pub const KEEP: f64 = 0.97;
 /// Steps for which the limit has to allow fewer parts before they are used.
 pub(crate) const REJOIN_AFTER: u64 = 1000;
-/// How often the steps of a run are halved at most.
+/// Maximum number of times that the steps of a run are halved.
 pub const MOST_HALVINGS: u32 = 3;
 
-/// The parts into which a step is cut, from how many there are now and the limit; `None` if more than
-/// `MOST_SUBSTEPS` are needed. Fewer than now only where they keep the reserve, so that a limit that hovers
-/// at a number of parts does not make it change all the time.
+/// Returns the parts into which a step is cut, from the present number of parts and the limit; `None` if more
+/// than `MOST_SUBSTEPS` are needed. Fewer parts than now are used only if they keep the reserve. So a limit
+/// that hovers at a number of parts does not make this number change all the time.
 pub(crate) fn substeps(step: f64, limit: f64, now: u32) -> Option<u32> {
     let enough = (step / (RESERVE * limit)).ceil();
     if enough > f64::from(MOST_SUBSTEPS) || enough.is_nan() {

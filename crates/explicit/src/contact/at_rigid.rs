@@ -56,9 +56,9 @@ impl AtRigid {
         }
     }
 
-    /// Returns the gap [m] of a node as it lies in the step, and the direction away from the thing. The
-    /// penetration that may remain is subtracted from the gap. `now` is the place [m] before the step, `then`
-    /// the place after it.
+    /// Returns the gap [m] of a node as it lies in the step, without the penetration that may remain. Also
+    /// returns the direction away from the thing. `now` is the place [m] before the step, `then` the place
+    /// after it.
     pub fn gap(
         &self,
         rigid: &Rigid,

@@ -116,8 +116,8 @@ impl Accuracy {
         self.left.iter().sum::<f64>().abs() / self.left.len().max(1) as f64
     }
 
-    /// True if the displacements, at an equilibrium of the forces, are accurate enough or have no prospect of
-    /// it.
+    /// True if the displacements, at an equilibrium of the forces, are accurate enough, or if the search has
+    /// waited too long.
     pub(super) fn suffices(&mut self, tolerance: f64) -> bool {
         self.waited += 1;
         self.waited > PATIENCE || self.mean() <= tolerance

@@ -1,11 +1,11 @@
 //! Quasi-static equilibrium by adaptive dynamic relaxation (Joldes, Wittek and Miller 2011). The nodes make a
-//! fictitious damped motion, uⁿ⁺¹ = uⁿ + β (uⁿ − uⁿ⁻¹) − α M⁻¹ r. Here α = 2/(2+c) and β = (2−c)/(2+c). Its
-//! masses make every cell equally fast. Its damping follows the slowest mode still moving: c = 2 √(A₀
+//! fictitious damped motion, uⁿ⁺¹ = uⁿ + β (uⁿ − uⁿ⁻¹) − α M⁻¹ r. Here α = 2/(2+c) and β = (2−c)/(2+c). The
+//! masses make every cell equally fast. The damping follows the slowest mode still moving: c = 2 √(A₀
 //! A_m/(A₀ + A_m)) with A_m = 4. A₀ is a running Rayleigh quotient Δuᵀ Δr / Δuᵀ M Δu of the last increment.
 //! Masses: m_a = s/n Σ_e V_e (λ+2μ) Σ|B|² over the cells at a node, n nodes per cell, s = 1.25.
 //!
 //! Time is the time of loads, motions and relaxing laws; inertia and damping of the bodies play no part.
-//! Loads and motions that act at time 0 already come at once: the first equilibrium, reached from rest, is
+//! Loads and motions that act at time 0 already come at once. The first equilibrium, reached from rest, is
 //! the one of the instantaneous laws at time 0. A load step that fails is tried again in halves, with twice
 //! the masses. History is committed only at convergence: inside a step every trial starts from the history of
 //! the step before.
@@ -432,8 +432,8 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
         if error.is_finite() { error } else { 0.0 }
     }
 
-    /// Returns the part of the way that is left: the work of the residual along the load step over the work
-    /// of the forces from outside. Round-off averages out in this work.
+    /// Returns the part of the way that is left. It is the work of the residual along the load step over the
+    /// work of the forces from outside. Round-off averages out in this work.
     fn left_along_the_way(&self, forces: &InternalForces<R>, state: &State<R>, start: &Start<R>) -> f64 {
         let (mut left, mut work) = (0.0, 0.0);
         for (node, (u, u0)) in state.displacement.iter().zip(&start.displacement).enumerate() {
@@ -662,9 +662,9 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
         state.time = end.time;
     }
 
-    /// Returns ∫ (f_Ψ − f)·du [J] over a load step that came to an equilibrium: energy that instantaneous
-    /// laws would have stored, but relaxing ones did not take up. By Simpson's rule; where a cell is inverted
-    /// halfway on the straight line, by the trapezoidal rule.
+    /// Returns ∫ (f_Ψ − f)·du [J] over a load step that came to an equilibrium. This is energy that
+    /// instantaneous laws would have stored, but relaxing ones did not take up. By Simpson's rule; where a
+    /// cell is inverted halfway on the straight line, by the trapezoidal rule.
     fn given_up(
         &mut self,
         forces: &mut InternalForces<R>,

@@ -70,8 +70,8 @@ impl<R: LaneNumber> Way<R> {
     }
 }
 
-/// Instant that is sought or passed: the loads and motions of a time [s], or at the start a part of the loads
-/// and motions at time 0.
+/// Instant that is sought or passed. It has the loads and motions of a time [s], or at the start a part of
+/// those at time 0.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Instant {
     pub(super) time: f64,

@@ -1,7 +1,7 @@
-//! Cells block by block. A block copies in the displacements of its nodes, adds up the forces of its cells in
-//! its own sums, and leaves these sums for the nodes. Each node adds up the few blocks at it in their order.
-//! So a block works in the first caches, and neither its size nor its sums depend on the number of threads.
-//! No atomic is needed, and all arrays have their final length from the start.
+//! Cells block by block. A block copies in the displacements of its nodes and adds up the forces of its cells
+//! in its own sums. It leaves these sums for the nodes. Each node adds up the few blocks at it in their
+//! order. So a block works in the first caches, and neither its size nor its sums depend on the number of
+//! threads. No atomic is needed, and all arrays have their final length from the start.
 
 use std::ops::Range;
 

@@ -1,6 +1,6 @@
-//! Hexahedra with 2×2×2 Gauss points for the change of shape and one mean dilatation, W = Σ w W_iso(F_g) + V
-//! U(v/V). They have no hourglass patterns and no locking, and take eight stresses a cell. The in-house
-//! reference for `hex8`.
+//! Hexahedra with 2×2×2 Gauss points for the change of shape and one mean dilatation. Their energy is W = Σ w
+//! W_iso(F_g) + V U(v/V). They have no hourglass patterns and no locking, and take eight stresses a cell. The
+//! in-house reference for `hex8`.
 
 use pliant_mechanics::element::GaussPoints;
 use pliant_mechanics::law::AnyLaw;

@@ -323,8 +323,8 @@ fn a_membrane_passes_the_patch_test() {
     }
 }
 
-/// A single bar has the natural frequency of two masses on a spring of E A/L₀, slack or not. The length of
-/// the first step agrees with it.
+/// A single bar, slack or not, has the critical time step of two masses on a spring of E A/L₀. Its force at
+/// the start follows from the slack.
 #[test]
 fn a_bar_vibrates_as_two_masses_on_a_spring() {
     for slack in [1.0, 0.8, 1.3] {
