@@ -8,7 +8,7 @@ use crate::kernel::{Binding, Bound, GROUP, Kernel, Sides};
 use crate::transfer::Four;
 use crate::{Device, GpuError};
 
-/// What finds the forces of grips, and which nodes they pull at.
+/// Kernel that finds the forces of grips, and the nodes that they pull at.
 pub(crate) struct DeviceGrips {
     kernel: Kernel,
     /// Nodes that are pulled at, increasing, each once.

@@ -92,7 +92,7 @@ pub fn tets_of(hexes: &[[u32; 8]]) -> Vec<[u32; 4]> {
     hexes.iter().flat_map(|hex| KUHN.map(|tet| tet.map(|corner| hex[corner]))).collect()
 }
 
-/// A block of so many cells of six tetrahedra along each edge, of a size [m] from the origin on.
+/// A block of `cells` cells of six tetrahedra along each edge, of a size [m] from the origin on.
 pub fn tet_block(cells: [u32; 3], size: [f64; 3]) -> (Vec<Vector<f64>>, Vec<[u32; 4]>) {
     let [nx, ny, nz] = cells;
     let all = |[nx, ny, nz]: [u32; 3]| {
