@@ -18,7 +18,7 @@ const ALL: u32 = 0b111;
 pub(crate) struct DeviceLoads {
     /// Finds the forces of pressed faces.
     pub pressure: Option<Kernel>,
-    /// Arrays that kernels that move nodes read.
+    /// Arrays for kernels that move nodes.
     arrays: [wgpu::Buffer; 4],
 }
 

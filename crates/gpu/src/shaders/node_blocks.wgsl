@@ -1,7 +1,7 @@
 // A step in one kernel. A block of neighbouring nodes reads the displacements of all nodes of the cells there
 // into shared memory, and finds the forces of these cells. It adds up the forces on its own nodes and moves
-// them from one side to the other: other blocks still read the old side. Cells at borders are evaluated by
-// several blocks, each with its own history.
+// these nodes from one side to the other: other blocks still read the old side. Cells at borders are
+// evaluated by several blocks, each with its own history.
 
 struct Block {
     // Its copies of cells.
