@@ -69,14 +69,14 @@ impl<R: LaneNumber> AppliedForces<R> {
         own
     }
 
-    /// Takes other grips.
+    /// Replaces the grips.
     pub(crate) fn grip(&mut self, grips: &[Grip]) {
         self.grips.clear();
         self.grips.extend_from_slice(grips);
         self.see_whether_loaded();
     }
 
-    /// Takes other forces [N] from outside that stay, one a node, or none.
+    /// Replaces the lasting forces [N] from outside, one per node, or none.
     pub(crate) fn push(&mut self, forces: &[Vector<f64>]) {
         self.given.clear();
         self.given.extend_from_slice(forces);

@@ -33,11 +33,11 @@ const FILLED: f64 = 1e-14;
 /// Motion of a node in a step without a constraint.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Predicted {
-    /// Its displacement [m] now.
+    /// Displacement [m] of the node now.
     pub now: Vector<f64>,
-    /// Its displacement [m] after the step.
+    /// Displacement [m] of the node after the step.
     pub displacement: Vector<f64>,
-    /// By how much a force moves it over the step [m/N].
+    /// Mobility: way per force over the step [m/N].
     pub mobility: f64,
     /// The components that another constraint prescribes; forces do not move them.
     pub held: [bool; 3],

@@ -46,9 +46,9 @@ pub(crate) struct Posture {
 
 /// Motion of a node in a step without contact.
 pub(crate) struct Free {
-    /// Its place [m] after the step.
+    /// Place [m] of the node after the step.
     pub then: Vector<f64>,
-    /// By how much a force moves each component over the step [m/N]; zero of those that are prescribed.
+    /// Mobility: way of each component per force over the step [m/N]; zero for prescribed components.
     pub mobility: Vector<f64>,
 }
 
@@ -57,9 +57,9 @@ pub(crate) struct Free {
 struct Node {
     free: Vector3<f64>,
     then: Vector3<f64>,
-    /// By how much contacts can move each component; zero also of nodes that jaws hold.
+    /// Mobility [m/N] under contacts; zero for prescribed components and for nodes that jaws hold.
     mobility: Vector3<f64>,
-    /// By how much a force does.
+    /// Mobility [m/N] under any force.
     own: Vector3<f64>,
     /// Impulses [N] of rows on it, of a node that jaws hold.
     borne: Vector3<f64>,
@@ -73,7 +73,7 @@ struct Node {
     paired: bool,
     /// The first of the rows on it alone.
     first: u32,
-    /// Its depth [m] in things at the predicted place.
+    /// Depth [m] of the node in things at the predicted place.
     depth: f64,
 }
 
@@ -274,7 +274,7 @@ impl<R: LaneNumber> ContactSolver<R> {
         touching.map(|(node, number)| (number, over(&(node.then - node.free), &node.own).into()))
     }
 
-    /// Says where coupled nodes go between two times [s]: from one place [m] to the other, at the same speed.
+    /// Leads the coupled nodes from one place [m] to another between two times [s], at constant speed.
     /// Impulses on them count from now on.
     pub fn lead(&mut self, times: [f64; 2], ways: &[[Vector<f64>; 2]]) {
         self.coupled_surfaces.lead(times, ways);
@@ -397,7 +397,7 @@ impl<R: LaneNumber> ContactSolver<R> {
         })
     }
 
-    /// Takes nodes along that jaws hold.
+    /// Takes along the nodes that jaws hold.
     fn grip(&mut self, gripped: &[Gripped]) {
         for held in gripped {
             let Some((_, own, node)) = self.holder(held) else { continue };

@@ -225,12 +225,12 @@ fn step_of(eigenvalue: f64) -> f64 {
 /// A difference has moves over its size, with their weights in the stiffness, and that size over the one of a
 /// cell. It is far from round-off and from the law's curvature.
 type Difference = (&'static [[f64; 2]], f64);
-/// This one takes the mean of two slopes.
+/// The central difference takes the mean of two slopes.
 const CENTRAL: Difference = (&[[1.0, 0.5], [-1.0, -0.5]], 1e-6);
-/// This one starts from the forces of the state itself.
+/// The forward difference starts from the forces of the state itself.
 const FORWARD: Difference = (&[[1.0, 1.0]], 1e-7);
-/// Both in single precision. A law that stiffens by e for each 1 % of strain is off by 1 % in the one of one
-/// side.
+/// Both differences in single precision. If a law stiffens by e for each 1 % of strain, the forward
+/// difference is off by 1 %.
 const CENTRAL_IN_SINGLE: Difference = (CENTRAL.0, 2e-3);
 const FORWARD_IN_SINGLE: Difference = (FORWARD.0, 2e-4);
 /// The most that rounding may take of a difference.
@@ -269,7 +269,7 @@ struct Operator<'a, R> {
     model: &'a Model,
     /// The displacements [m] about which the model vibrates, tied nodes where their ties put them.
     about: Vec<Vector<R>>,
-    /// With its largest displacement [m].
+    /// Difference, with its largest displacement [m].
     difference: Difference,
     forces: &'a mut InternalForces<R>,
     /// Forces [N] of the state, where a difference is taken from them.

@@ -89,7 +89,7 @@ mod tests {
         assert!(made.len() < 20 && made[..2] == [0, 50] && made.contains(&3600), "{made:?}");
     }
 
-    /// One that stands still is checked every thousand steps, and where the deformation changes.
+    /// A constant limit is checked every thousand steps, and where the deformation changes.
     #[test]
     fn a_limit_that_stands_still_is_checked_now_and_then() {
         let (flat, stretched) =

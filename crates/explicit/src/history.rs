@@ -10,15 +10,15 @@ use crate::lanes::{PACK, Pack};
 /// History of the relaxing law of a solid.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct History<R> {
-    /// For each pack of cells [`History::slots`] tensors of six packs.
+    /// [`History::slots`] tensors of six packs for each pack of cells.
     pub cells: Vec<Pack<R>>,
-    /// For each pack of averaged pressures: Φⁿ⁻¹ and one h per volumetric term. Empty if pressures are not
+    /// Φⁿ⁻¹ and one h per volumetric term for each pack of averaged pressures; empty if pressures are not
     /// averaged.
     pub pressures: Vec<Pack<R>>,
 }
 
 impl<R: LaneNumber> History<R> {
-    /// At rest.
+    /// Makes the history at rest.
     pub(crate) fn at_rest(solid: &Solid) -> Self {
         let packs = |count: usize, slots: usize| vec![Pack::ZERO; count.div_ceil(PACK) * slots];
         Self {
@@ -41,7 +41,7 @@ impl<R: LaneNumber> History<R> {
         tensors.map(move |packs| Symmetric(std::array::from_fn(|k| packs[k].0[cell % PACK].to_f64())))
     }
 
-    /// Takes on the tensors of a cell.
+    /// Sets the tensors of a cell.
     pub fn set_cell(&mut self, cell: usize, tensors: &[Symmetric<f64>]) {
         for (slot, tensor) in tensors.iter().enumerate() {
             for (k, &entry) in tensor.0.iter().enumerate() {

@@ -35,7 +35,7 @@ impl<R: LaneNumber> Pack<R> {
     /// Pack of zeros.
     pub(crate) const ZERO: Self = Self([R::ZERO; PACK]);
 
-    /// From the number of each lane.
+    /// Makes a pack from the number of each lane.
     pub(crate) fn from_fn(number: impl FnMut(usize) -> R) -> Self {
         Self(std::array::from_fn(number))
     }
@@ -291,7 +291,7 @@ unsafe fn proof<S: Simd>() -> S {
 /// which the processor adds to an address without a shift. The largest offset of a block is found once for
 /// all steps: a comparison for each access costs a tet 1 ns of 9.
 pub(crate) struct Places<R, const N: usize> {
-    /// In [`Unit`]s, multiples of a vector.
+    /// Offsets in [`Unit`]s, multiples of a vector.
     offsets: Vec<[[u16; PACK]; N]>,
     /// The largest of each block.
     most: Vec<u16>,
@@ -314,8 +314,8 @@ impl<R: LaneNumber, const N: usize> Places<R, N> {
         units::<R>() * packs * PACK * N <= 1 << 16
     }
 
-    /// From the numbers of the nodes of packs of cells, and how many packs a block has: not more than
-    /// [they reach](Self::can_number).
+    /// Makes the places from the node numbers of packs of cells, and the number of packs in a block. A block
+    /// has at most as many packs as [offsets reach](Self::can_number).
     pub(crate) fn new(packs: impl Iterator<Item = [[u16; PACK]; N]>, per_block: usize) -> Self {
         let offset = |place: u16| place * units::<R>() as u16;
         let offsets: Vec<_> = packs.map(|pack| pack.map(|places| places.map(offset))).collect();

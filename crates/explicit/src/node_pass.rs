@@ -196,7 +196,7 @@ impl<R: LaneNumber> Known<[Vector<R>; BLOCK]> {
 }
 
 impl<'a, R: LaneNumber> Known<&'a [Vector<R>]> {
-    /// With nodes at rest beyond the last one, for which there is room.
+    /// Fills up the block with nodes at rest beyond the last node, for which there is room.
     #[inline(always)]
     fn filled_up(self, room: &'a mut Known<[Vector<R>; BLOCK]>) -> Whole<'a, R> {
         let fill = |own: &'a [Vector<R>], room: &'a mut [Vector<R>; BLOCK]| match own.first_chunk() {

@@ -87,11 +87,11 @@ pub fn stored_at_start<R: LaneNumber>(model: &Model, state: &State<R>, hourglass
 
 /// Averages that the cells of a solid use.
 enum Averages {
-    /// Nothing.
+    /// No averages.
     None,
     /// Averages of the volumetric part of the law.
     Volumetric(Vec<Dilatation>),
-    /// Their volume ratio J̄, minus 1.
+    /// Averaged volume ratio J̄ of each cell, minus 1.
     VolumeChange(Vec<f64>),
 }
 

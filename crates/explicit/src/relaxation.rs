@@ -95,7 +95,7 @@ impl<R: LaneNumber> Relaxation<R> {
         &self.volumetric
     }
 
-    /// Takes on the coefficients of the same series for steps of `step` seconds.
+    /// Sets the coefficients of the same series for steps of `step` seconds.
     pub fn set_step(&mut self, prony: &Prony, step: f64) {
         self.isochoric.set_step(&prony.isochoric, prony.update, step);
         self.volumetric.set_step(&prony.volumetric, prony.update, step);

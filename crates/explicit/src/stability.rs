@@ -125,7 +125,7 @@ impl Monitor {
         self.on_unstable
     }
 
-    /// Takes on the reference of a state, where it has another one than before.
+    /// Adopts the reference of a state, if it differs from the present one.
     pub(crate) fn refer_to<R>(&mut self, state: &State<R>) {
         let reference = state.stability.reference;
         if let (true, Some((limit, _))) = (self.reference != reference, reference) {
@@ -473,7 +473,7 @@ struct Ranks<'a, R> {
     /// κ and λ + 2μ at rest [Pa].
     bulk: f64,
     rest: f64,
-    /// By the squared speed of an isotropic guess, and by the squared stretch.
+    /// Ranks by the squared speed of an isotropic guess, and by the squared stretch.
     speeds: &'a mut [u64],
     stretches: &'a mut [u64],
 }

@@ -113,8 +113,8 @@ fn place_collective(model: &Model, own: &Constraint, owners: &[[u32; 3]], displa
 }
 
 impl<R: LaneNumber> State<R> {
-    /// At rest at time 0, prescribed nodes and all that follows them where their motion starts. Nodes of a
-    /// mean shift together, those around a prescribed volume along its gradient.
+    /// Makes the state at rest at time 0. Prescribed nodes and their followers are where their motion starts.
+    /// Nodes of a mean shift together, nodes around a prescribed volume along its gradient.
     pub fn at_rest(model: &Model) -> Self {
         let mut displacement = vec![[0.0; 3]; model.node_count()];
         if let Ok(owners) = model.constrained_components() {
@@ -149,7 +149,7 @@ impl<R: LaneNumber> State<R> {
         }
     }
 
-    /// Has room for the internal forces of the last two instants.
+    /// Makes room for the internal forces of the last two instants.
     pub fn keep_forces(&mut self) {
         let nodes = self.displacement.len();
         if self.forces[0].len() != nodes {

@@ -65,7 +65,7 @@ pub struct Clock {
 /// Whole steps of one length, cut where the limit asks for it.
 pub struct StepControl {
     step: f64,
-    /// From which time [s] and number they are counted.
+    /// Time [s] and number from which whole steps are counted.
     since: (f64, u64),
     /// The length [s] of the (sub)step before, where it was no part of such a step.
     before: Option<f64>,

@@ -60,7 +60,7 @@ pub enum StepError {
         body: String,
         /// The element that sets the limit, numbered as in the user's mesh.
         element: u32,
-        /// Its first node, numbered in its body.
+        /// First node of the element, numbered in its body.
         node: u32,
         /// The limit [s].
         limit: f64,

@@ -51,7 +51,7 @@ const LEAST_CHUNKS: usize = 5;
 pub enum Wanted {
     /// Energies and reactions.
     Energies,
-    /// Also displacements, increments and what relaxing laws remember.
+    /// Energies, reactions, displacements, increments and the history of relaxing laws.
     Everything,
 }
 
@@ -179,7 +179,7 @@ pub struct CentralDifference<R> {
     balance_floor: f64,
 }
 
-/// At the last evaluation.
+/// Results at the last evaluation.
 impl<R: SteppedIn> Observable<R> for CentralDifference<R> {
     fn energies(&self) -> &Energies {
         &self.energies
@@ -359,13 +359,12 @@ impl<R: SteppedIn> CentralDifference<R> {
         self.control.go_on(clock, step, state);
     }
 
-    /// Takes hold of points: these grips and no others act from the next evaluation on. Their work is
-    /// external.
+    /// Replaces the grips: only these act from the next evaluation on. Their work is external.
     pub fn grip(&mut self, grips: &[Grip]) {
         self.applied.grip(grips);
     }
 
-    /// Takes forces [N] from outside, one a node, or none: they and no others act from the next evaluation on
+    /// Replaces the forces [N] from outside, one per node, or none. They act from the next evaluation on
     /// until they are replaced. Their work is external.
     pub fn push(&mut self, forces: &[Vector<f64>]) {
         self.applied.push(forces);

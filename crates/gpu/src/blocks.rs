@@ -226,7 +226,7 @@ pub(crate) struct NodeBlocks {
     nodes: Vec<u32>,
     /// The cells of all blocks; those at borders are in several blocks.
     cells: Vec<u32>,
-    /// Their corners among the nodes of their block, in rows of all cells.
+    /// Corners of the cells among the nodes of their block, in rows of all cells.
     corners: Vec<u32>,
     /// Bits of a corner.
     corner_bits: usize,

@@ -291,7 +291,7 @@ const CONTACT: usize = 8;
 #[derive(Default)]
 struct Face {
     colour: usize,
-    /// Its contacts, each with its edges as [`FacePoints::edges`] has them.
+    /// Contacts of the face, each with its edges as [`FacePoints::edges`] has them.
     contacts: Vec<(usize, [bool; 3])>,
 }
 
@@ -303,7 +303,7 @@ struct Touched {
     first_point: usize,
     /// The contacts of each node.
     at_node: Vec<Vec<usize>>,
-    /// In the order of their colours.
+    /// Faces in the order of their colours.
     faces: Vec<([u32; 3], Face)>,
     /// Most points of a face, of each contact.
     points_of: Vec<usize>,
@@ -476,7 +476,7 @@ fn coloured(faces: BTreeMap<[u32; 3], Face>, nodes: usize) -> Vec<([u32; 3], Fac
 mod tests {
     use super::*;
 
-    /// Around a point with many faces each has a colour of its own; others use these again.
+    /// The faces around a point have a colour each; other faces use these colours again.
     #[test]
     fn faces_of_a_colour_share_no_node() {
         let fan = (1..=7).map(|k| [0, k, k % 7 + 1]).chain([[8, 9, 10], [10, 11, 12]]);

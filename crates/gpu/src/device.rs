@@ -36,13 +36,13 @@ impl std::fmt::Display for Kind {
 /// Adapter with its relevant properties.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Adapter {
-    /// Its name.
+    /// Name of the adapter.
     pub name: String,
     /// The adapter.
     pub kind: Kind,
     /// `vulkan`, `metal` or `dx12`.
     pub backend: String,
-    /// Its driver, with version.
+    /// Driver of the adapter, with version.
     pub driver: String,
     /// The largest array a kernel can work on [B].
     pub largest_buffer: u64,

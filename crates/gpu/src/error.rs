@@ -49,7 +49,7 @@ pub enum GpuError {
         adapter: String,
         /// Contents of the array.
         what: &'static str,
-        /// Its size [B].
+        /// Size of the array [B].
         needed: u64,
         /// The most that is allowed [B].
         limit: u64,

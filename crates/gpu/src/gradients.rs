@@ -190,7 +190,7 @@ impl Arrays {
         })
     }
 
-    /// Takes a pattern.
+    /// Sets the pattern.
     ///
     /// # Errors
     /// If an array is too large.

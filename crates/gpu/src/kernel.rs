@@ -10,7 +10,7 @@ use crate::{Device, GpuError};
 /// Invocations in a group.
 pub(crate) const GROUP: u32 = 128;
 
-/// Its name in kernels. One of the constants of a kernel may have this name and another number.
+/// Name of the group size in kernels. One of the constants of a kernel may have this name and another number.
 pub(crate) const GROUP_NAME: &str = "GROUP";
 
 /// Most groups along one dimension of a dispatch.
@@ -167,15 +167,15 @@ pub(crate) type Sides = [wgpu::Buffer; 2];
 pub(crate) enum Binding<'a> {
     /// No kernel that is bound here uses this number.
     Nothing,
-    /// To read the side that is now.
+    /// Array whose present side is read.
     ReadNow(&'a Sides),
-    /// To read and write the side that is now.
+    /// Array whose present side is read and written.
     WriteNow(&'a Sides),
-    /// To write the other side.
+    /// Array whose other side is written.
     WriteNext(&'a Sides),
-    /// To read.
+    /// Array to read.
     Read(&'a wgpu::Buffer),
-    /// To read and write.
+    /// Array to read and write.
     Write(&'a wgpu::Buffer),
     /// Uniform for all invocations.
     Uniform(&'a wgpu::Buffer),
@@ -223,7 +223,7 @@ impl<'a> Binding<'a> {
 /// A group of bindings with its layout, in the order of their numbers.
 pub(crate) struct Bound {
     layout: wgpu::BindGroupLayout,
-    /// For each side that may be now.
+    /// Bind groups for each side that may be now.
     groups: [wgpu::BindGroup; 2],
     /// Number of arrays.
     arrays: u32,
@@ -264,7 +264,7 @@ impl Bound {
 /// A kernel with the arrays it works on; group 0 is the instant's.
 pub(crate) struct Kernel {
     pipeline: wgpu::ComputePipeline,
-    /// For each side that may be now.
+    /// Bind groups for each side that may be now.
     bound: [Vec<wgpu::BindGroup>; 2],
     /// Groups of invocations along two dimensions.
     dispatch: [u32; 2],
@@ -278,7 +278,7 @@ pub(crate) fn groups(invocations: usize) -> [u32; 2] {
 }
 
 impl Kernel {
-    /// From snippets of WGSL whose entry is `main`, with constants before them.
+    /// Makes a kernel from snippets of WGSL whose entry is `main`, with constants before them.
     ///
     /// # Errors
     /// If it works on more arrays, or in larger groups, than the adapter allows.

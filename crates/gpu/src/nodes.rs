@@ -56,7 +56,8 @@ pub(crate) struct NodeKernels {
 }
 
 impl DeviceNodes {
-    /// With `blocks` that move nodes from one side to the other, if there are some.
+    /// Makes the arrays; `blocks` is the number of blocks that move nodes from one side to the other, if
+    /// there are some.
     ///
     /// # Errors
     /// If an array is too large.
@@ -214,7 +215,7 @@ pub(crate) const MOVE: &str = include_str!("shaders/move.wgsl");
 /// The coming increment of a node.
 pub(crate) const MOTION: &str = include_str!("shaders/central_difference.wgsl");
 
-/// Without contacts.
+/// Shader of nodes without contacts.
 pub(crate) const UNTOUCHED: &str = include_str!("shaders/untouched.wgsl");
 
 /// Returns the shader of the forces on nodes from outside.

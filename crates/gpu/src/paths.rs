@@ -24,7 +24,7 @@ use crate::ties::{Followers, Giving};
 use crate::transfer::Four;
 use crate::{Design, Device, GpuError};
 
-/// Takes displacements from where they lie.
+/// Shader that reads displacements where they lie.
 pub(crate) const CORNERS: &str = include_str!("shaders/cell_corners.wgsl");
 /// The entry of a kernel of which each invocation takes a cell.
 pub(crate) const EACH_CELL: &str = include_str!("shaders/each_cell.wgsl");
@@ -35,11 +35,11 @@ const FIXED: &str = include_str!("shaders/fixed.wgsl");
 pub(crate) struct Paths {
     /// Arrays that kernels of cells read and write.
     pub cells: Bound,
-    /// Their snippet: `displacement_of`, `give` and the entry.
+    /// Shader snippet of cells: `displacement_of`, `give` and the entry.
     pub cell_snippet: String,
     /// Arrays that the passes over nodes read.
     pub nodes: Bound,
-    /// Their snippet: `internal_force` and `clear`.
+    /// Shader snippet of nodes: `internal_force` and `clear`.
     pub node_snippet: String,
     /// Path of forces on nodes that follow others, if there are any.
     pub giving: Option<Giving>,
@@ -58,7 +58,7 @@ pub(crate) struct Paths {
 }
 
 impl Paths {
-    /// With what the nodes are cut into, where the design does so.
+    /// Makes the paths of a design; `cut` has the blocks of nodes if the design cuts them.
     ///
     /// # Errors
     /// If an array is too large, or the device lacks what the design needs.
@@ -174,7 +174,8 @@ impl Paths {
         })
     }
 
-    /// From slots with their nodes, which gather them; what the slots and their lists are in words.
+    /// Makes paths from slots with their nodes, which gather them. `what` and `lists` describe the slots and
+    /// their lists in words.
     fn of_slots(
         memory: &Memory<'_>,
         device: &Device,
@@ -239,7 +240,7 @@ impl Paths {
         })
     }
 
-    /// Begins at zero.
+    /// Sets the sums to zero.
     pub(crate) fn clear(&self, device: &Device) {
         if let Some(sums) = &self.sums {
             let mut encoder = device.device.create_command_encoder(&Default::default());

@@ -228,7 +228,7 @@ impl Instants {
         Ok(Self { bound, rows, findings, grips, contacts })
     }
 
-    /// Takes grips as instant.wgsl reads them.
+    /// Sets the grips, in the form that instant.wgsl reads.
     ///
     /// # Errors
     /// If there are too many.

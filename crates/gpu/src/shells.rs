@@ -81,7 +81,7 @@ pub struct GpuShells {
 /// A node that a constraint moves.
 struct Moved {
     constraint: usize,
-    /// Its place among the nodes of the constraint.
+    /// Index of the node in the constraint.
     index: usize,
     components: [bool; 6],
     /// Place of its six numbers in a row of the table.
@@ -170,7 +170,7 @@ impl GpuShells {
         self.step
     }
 
-    /// Takes up another state than the one it has come to.
+    /// Uploads another state than the present one.
     pub fn upload(&mut self, state: &State) {
         let four = |v: &Vector3<f64>| [v.x as f32, v.y as f32, v.z as f32, 0.0];
         let places: Vec<[Four; 2]> = (state.position.iter().zip(&state.rotation).enumerate())
@@ -186,8 +186,8 @@ impl GpuShells {
         self.loaded = true;
     }
 
-    /// Takes forces [N] on nodes. These forces and no others act from the next step on, in addition to the
-    /// loads of the model.
+    /// Replaces the forces [N] on nodes from outside. Only these act from the next step on, in addition to
+    /// the loads of the model.
     pub fn push(&mut self, forces: &[(u32, [f64; 3])]) {
         if forces.is_empty() && !self.pushed {
             return;
@@ -303,7 +303,7 @@ struct Kernels<'a> {
 /// The kernel of facets, and the forces that it finds.
 struct FacetForces {
     kernel: Kernel,
-    /// On the corners.
+    /// Forces on the corners.
     forces: wgpu::Buffer,
     pressed: Option<Pressed>,
 }

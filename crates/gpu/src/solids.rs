@@ -57,7 +57,7 @@ fn pressure_order(cells: &Cells, order: &[u32]) -> Vec<u32> {
 
 /// A solid on the device.
 pub(crate) struct DeviceSolid {
-    /// In the order they run.
+    /// Kernels in the order they run.
     kernels: Vec<Kernel>,
     /// History of relaxing laws, for cells and for averaged pressures.
     histories: [wgpu::Buffer; 2],
@@ -165,7 +165,7 @@ impl DeviceSolid {
         &self.kernels
     }
 
-    /// Takes up the history of a state.
+    /// Uploads the history of a state.
     pub(crate) fn upload(&self, device: &Device, history: &History<f32>) {
         for (index, packs) in [&history.cells, &history.pressures].into_iter().enumerate() {
             let mut numbers = vec![0.0_f32; self.numbers(index)];

@@ -87,7 +87,7 @@ impl AtRigid {
         &self.listed.nodes
     }
 
-    /// With what comes near by itself, besides a room [m].
+    /// Returns `room` [m], plus the distance at which nodes at rest count as near, and the thing's travel.
     fn room(&self, room: f64) -> f64 {
         room + self.margin + self.passage.travel()
     }
@@ -205,9 +205,9 @@ impl AtRigid {
 /// A node at a thing.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Seen {
-    /// Its place in the frame of the thing at the end of the step [m].
+    /// Place of the node in the frame of the thing at the end of the step [m].
     local: Vector3<f64>,
-    /// Its distance from it [m].
+    /// Distance of the node from the thing [m].
     distance: f64,
 }
 

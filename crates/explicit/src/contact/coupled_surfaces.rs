@@ -16,7 +16,7 @@ pub(super) struct CoupledSurfaces {
     ways: Vec<[Vector<f64>; 2]>,
     /// Shares of that time at the beginning and the end of the step.
     time_fractions: [f64; 2],
-    /// On each since it was led [N s].
+    /// Impulse [N s] on each node since the nodes were led.
     impulses: Vec<Vector<f64>>,
 }
 
@@ -38,7 +38,7 @@ impl CoupledSurfaces {
         self.ways[number - self.first][0].into()
     }
 
-    /// Its place among the coupled nodes; `None` of a node of the model.
+    /// Returns the place of a node among the coupled nodes; `None` for a node of the model.
     pub fn place_of(&self, number: u32) -> Option<usize> {
         (number as usize).checked_sub(self.first)
     }

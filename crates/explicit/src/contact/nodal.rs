@@ -15,7 +15,7 @@ const LASTS: f64 = 0.1;
 /// A node of a surface that may touch, at an instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NodeContact {
-    /// Its number in the model.
+    /// Number of the node in the model.
     pub node: u32,
     /// Sum of the forces of contacts on it [N].
     pub force: Vector<f64>,

@@ -10,7 +10,7 @@ const IDLE: f64 = 0.999;
 /// The change of an impulse, over itself, at which it stays as it is until its nodes move.
 const SETTLED: f64 = 1e-9;
 
-/// No row.
+/// Marks the absence of a row.
 pub(super) const NONE: u32 = u32::MAX;
 
 /// A pair of points that may touch.
@@ -156,7 +156,7 @@ pub(super) fn idle(rows: &mut Vec<Row>, node: &mut Node, new: Row) -> Option<u32
     })
 }
 
-/// Takes back the impulses of a contact on a node alone; the last such row, if there are any.
+/// Takes back the impulses of a contact on a single node. Returns the last such row, if there are any.
 pub(super) fn take_back(rows: &mut [Row], node: &mut Node, contact: usize) -> Option<u32> {
     let (mut next, mut last) = (node.first, None);
     while let Some(row) = rows.get_mut(next as usize) {

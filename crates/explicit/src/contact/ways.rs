@@ -63,7 +63,7 @@ impl<R: LaneNumber> LaneWork<R> for Largest<'_, R> {
     }
 }
 
-/// Takes the squares of differences where they are larger.
+/// Raises `most` to the squares of differences where these are larger.
 #[inline(always)]
 fn take_larger<R: LaneNumber>(most: &mut [R; WIDTH], a: &[R], b: &[R]) {
     for (most, (&a, &b)) in most.iter_mut().zip(a.iter().zip(b)) {

@@ -33,8 +33,8 @@ fn oscillator() -> Model {
     model
 }
 
-/// By which factor the amplitude of a mode changes in a step, at Ω: a root of the characteristic polynomial
-/// by Newton's method.
+/// Returns the factor on the amplitude of a mode in a step, at Ω. Newton's method finds it as a root of the
+/// characteristic polynomial.
 fn expected(omega: f64) -> f64 {
     let (eta, square) = (DISSIPATION, omega * omega);
     let mut z = Complex::from_polar(1.0, 2.0 * (0.5 * omega).asin());

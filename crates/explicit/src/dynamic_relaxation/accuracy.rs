@@ -67,7 +67,7 @@ impl Default for Search {
 }
 
 impl Search {
-    /// Takes note of a residual; `ramped` under the whole load. Whether the motion is to start anew.
+    /// Notes a residual; `ramped` is set under the whole load. Returns true if the motion is to start anew.
     pub(super) fn runs_away(&mut self, residual: f64, ramped: bool) -> bool {
         let runs_away = ramped && residual > RUNAWAY * self.least;
         self.least = if runs_away { residual } else { self.least.min(residual) };

@@ -218,13 +218,13 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
         Equilibrium { energies: self.energies, residual: self.residual.clone(), way: self.way.clone() }
     }
 
-    /// Takes forces [N] from outside, one a node, or none: they and no others act in the equilibria to come
-    /// until they are replaced. Their work is external.
+    /// Replaces the forces [N] from outside, one per node, or none. They act in the coming equilibria until
+    /// they are replaced. Their work is external.
     pub fn push(&mut self, forces: &[Vector<f64>]) {
         self.applied.push(forces);
     }
 
-    /// Takes up an equilibrium of the same model, so that all that can be asked belongs to it.
+    /// Resumes from an equilibrium of the same model, so that all results belong to it.
     pub fn resume(&mut self, Equilibrium { energies, residual, way }: Equilibrium<R>) {
         (self.energies, self.residual, self.way) = (energies, residual, way);
     }
@@ -294,7 +294,7 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
         Ok(convergence)
     }
 
-    /// Goes from one place of a path to another, in as many parts as it takes.
+    /// Advances from one place of a path to another, in as many parts as needed.
     fn approach(
         &mut self,
         state: &mut State<R>,
@@ -590,7 +590,7 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
         }
     }
 
-    /// Takes the forces of collective constraints out of the residual: it is internal minus applied force
+    /// Removes the forces of collective constraints from the residual: it is internal minus applied force
     /// again.
     fn unbind(&mut self) {
         for (residual, bound) in self.residual.iter_mut().zip(&self.bound) {

@@ -31,7 +31,7 @@ pub struct Way<R> {
     pub error: Option<f64>,
     /// Estimated error of the displacements over the largest one, at worst.
     pub displacement_error: f64,
-    /// From the last equilibrium but one to the last, of each node: the motion [m] and the change of load and
+    /// Motion [m] of each node from the last equilibrium but one to the last, and its change of load and
     /// reaction [N].
     pub(super) last: Vec<[Vector<R>; 2]>,
 }

@@ -188,13 +188,13 @@ pub(super) struct Moved<R> {
     vectors: Vec<Quad<R>>,
 }
 
-/// One block at work.
+/// Block at work.
 pub(super) struct Task<'a, R> {
     /// Number of the block.
     pub block: usize,
-    /// Its nodes.
+    /// Nodes of the block.
     pub nodes: &'a [u32],
-    /// Their displacements [m].
+    /// Displacements [m] of these nodes.
     pub moved: &'a mut [Quad<R>],
     /// The forces [N] of its cells on them.
     pub forces: &'a mut [Quad<R>],

@@ -33,11 +33,11 @@ pub(super) struct FullHexConstants<R> {
     volumetric_slots: usize,
 }
 
-/// One of the eight points of packs of cells.
+/// Point of packs of cells, one of eight.
 struct Point<R> {
     /// Gradients of the shape functions [1/m], of all nodes but the first.
     gradient: [Vector<Pack<R>>; 7],
-    /// Its volume [m³].
+    /// Volume [m³] of the point.
     weight: Pack<R>,
 }
 

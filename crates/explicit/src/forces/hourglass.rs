@@ -69,7 +69,7 @@ impl<R: LaneNumber> Resistance<R> {
         [L::of(0.5) * stiffness * energy, L::load(&control.reach, at) * energy]
     }
 
-    /// Takes a factor g into account.
+    /// Multiplies the resistance by a factor g.
     #[inline(always)]
     fn grow<L: Lanes<R>>(&mut self, factor: L, at: usize) {
         for kq in &mut self.0 {
@@ -78,7 +78,7 @@ impl<R: LaneNumber> Resistance<R> {
         }
     }
 
-    /// Takes Σ_c k q_c ⊗ Y_c from V P.
+    /// Subtracts Σ_c k q_c ⊗ Y_c from V P.
     #[inline(always)]
     pub(super) fn turn<L: Lanes<R>>(&self, control: &PackedHourglass<R>, piola: &mut Tensor<L>, at: usize) {
         for (kq, moment) in self.0.iter().zip(&control.moments) {

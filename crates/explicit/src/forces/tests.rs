@@ -33,8 +33,8 @@ pub(crate) fn distorted_cube(element: &str, law: AnyLaw) -> Model {
     filled_cube(element, law, 700.0, 1000.0, |_| 1.0)
 }
 
-/// Like [`distorted_cube`], with a shear modulus for the hourglass control, a density, and a fraction for
-/// each cell.
+/// Builds a cube like [`distorted_cube`], with a shear modulus for the hourglass control, a density, and a
+/// fraction for each cell.
 fn filled_cube(
     element: &str,
     law: AnyLaw,
@@ -233,7 +233,7 @@ pub(crate) fn every_element() -> impl Iterator<Item = Model> {
     laws().into_iter().flat_map(|law| ELEMENTS.map(|element| distorted_cube(element, law)))
 }
 
-/// Each also with cells of which the body fills a part.
+/// Builds models of every element, each also with cells of which the body fills a part.
 fn every_element_full_or_not() -> impl Iterator<Item = Model> {
     let mut random = Random::new(19);
     let filled = laws().into_iter().flat_map(|law| ELEMENTS.map(|element| (element, law)));

@@ -51,7 +51,7 @@ fn momenta(model: &Model, state: &State<f64>, step: f64) -> [Vector3<f64>; 2] {
     all
 }
 
-/// One step; the force [N] of the first contact on the second body, and the state's energy [J].
+/// Takes one step. Returns the force [N] of the first contact on the second body, and the state's energy [J].
 fn step(stepper: &mut CentralDifference<f64>, state: &mut State<f64>) -> ([f64; 3], f64) {
     stepper.evaluate(state).unwrap();
     let (force, energies) = (stepper.contact_forces()[0], *stepper.energies());

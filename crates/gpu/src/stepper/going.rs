@@ -15,8 +15,8 @@ use crate::run::{Instant, StepFailure, UNLISTED, flags, room};
 use crate::transfer::Four;
 
 impl GpuStepper {
-    /// Takes whole steps without an evaluation; the last submission, which may not be done yet. Where bodies
-    /// touch each other, one number is read back to see whether the device has stopped for lists of
+    /// Takes whole steps without an evaluation. Returns the last submission, which may not be done yet. If
+    /// bodies touch each other, one number is read back to see if the device has stopped for lists of
     /// candidates.
     pub(super) fn go(
         &mut self,

@@ -351,9 +351,9 @@ impl GpuStepper {
         Ok(())
     }
 
-    /// Goes up to `steps` whole steps on, as many as take about `within`, and waits for them without any
-    /// read-back, unless bodies touch each other. Returns how many. After a failure the device stops, and the
-    /// next evaluation reports it. The first instant is evaluated where that is not done yet.
+    /// Advances by up to `steps` whole steps, as many as take about `within`, and waits for them. Nothing is
+    /// read back, unless bodies touch each other. Returns the number of steps. After a failure the device
+    /// stops, and the next evaluation reports it. The first instant is evaluated if it is not evaluated yet.
     ///
     /// # Errors
     /// As [`Self::evaluate`] at the first instant, and if the device fails.
@@ -378,8 +378,7 @@ impl GpuStepper {
         Ok(steps)
     }
 
-    /// Takes hold of points: these grips and no others act from the next evaluation on. Their work is
-    /// external.
+    /// Replaces the grips: only these act from the next evaluation on. Their work is external.
     ///
     /// # Errors
     /// If there are too many for the device.

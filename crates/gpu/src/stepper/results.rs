@@ -196,7 +196,7 @@ impl Readings {
     }
 }
 
-/// For each constraint the places in `held` of its nodes, and the components it owns.
+/// Returns for each constraint the places of its nodes in `held`, and the components it owns.
 fn owned(model: &Model, owners: &[[u32; 3]], held: &[u32]) -> Vec<Vec<(u32, [bool; 3])>> {
     let of_node = |index: u32, node: u32| {
         let owns = owners[node as usize].map(|owner| owner == index);

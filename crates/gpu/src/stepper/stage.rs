@@ -67,7 +67,7 @@ pub(super) struct Progress {
 }
 
 impl Progress {
-    /// Begins at a state that was just evaluated, its arrays on a side.
+    /// Makes the progress at a state that was just evaluated, its arrays on a side.
     pub(super) fn new(state: &State<f32>, side: usize) -> Self {
         let State { steps, time, stability, .. } = *state;
         Self { side, steps, time, stability, instants: 0, entered: false }

@@ -127,7 +127,7 @@ fn a_pulsing_tube_moves_as_on_the_cpu() {
     }
 }
 
-/// With Newton's method both come to the same states, to the tolerance of a step.
+/// Newton's method comes to the same states with both, to the tolerance of a step.
 #[test]
 fn newtons_method_converges_to_the_states_of_the_cpu() {
     let Some(device) = support::device() else { return };

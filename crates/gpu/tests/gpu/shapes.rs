@@ -136,7 +136,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 }
 ";
 
-/// To single precision, however small: devices need not find them so.
+/// Roots and sines are right to single precision, however small: devices need not find them so.
 #[test]
 fn roots_and_sines_keep_their_relative_digits() {
     let Some(device) = support::device() else { return };

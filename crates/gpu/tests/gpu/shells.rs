@@ -163,7 +163,7 @@ fn off(model: &Assembly, [one, other]: &[State; 2]) -> [f64; 2] {
     ]
 }
 
-/// After 200 steps places, rotations and the work of forces from outside differ by 1e-5 at most, the
+/// Places, rotations and the work of forces from outside differ by 1e-5 at most after 200 steps, the
 /// round-off of single precision.
 #[test]
 fn shells_move_as_on_the_cpu() {

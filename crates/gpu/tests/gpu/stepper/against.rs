@@ -34,7 +34,7 @@ pub fn distance(a: &[Vector<f64>], b: &[Vector<f64>]) -> f64 {
     norm(a.iter().zip(b).map(|(a, b)| a - b)) / norm(a.iter().copied()).max(1e-30)
 }
 
-/// In double precision.
+/// Converts to double precision.
 pub fn double(vectors: &[Vector<f32>]) -> Vec<Vector<f64>> {
     vectors.iter().map(|v| v.map(f64::from)).collect()
 }
@@ -45,7 +45,7 @@ pub fn numbers(energies: &Energies) -> [f64; 6] {
     [kinetic, internal, damping, hourglass, external, step_changes]
 }
 
-/// One of a design.
+/// Makes a stepper of a design.
 pub fn stepper(device: &Device, model: &Model, step: f64, design: Design) -> GpuStepper {
     GpuStepper::new(device, model.clone(), step, Some(design)).unwrap_or_else(|error| panic!("{error}"))
 }

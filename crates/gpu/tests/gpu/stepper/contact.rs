@@ -55,7 +55,7 @@ pub(super) fn rigid(name: &str, shape: Shape, trajectory: Trajectory) -> Rigid {
     Rigid { name: name.into(), shape, trajectory, inside: false, jaw: None }
 }
 
-/// Goes from a place by a way in 0.3 s.
+/// Makes a trajectory from a place by a way in 0.3 s.
 pub(super) fn moving(from: Pose, way: [f64; 3]) -> Trajectory {
     Trajectory::by(from, way, smooth(0.3))
 }
@@ -104,7 +104,7 @@ fn tissue() -> Model {
     held_cube("tet4", elastic(neo_hookean()))
 }
 
-/// In every design that has contact.
+/// Tests every design that has contact.
 #[test]
 fn a_cube_falls_onto_a_slope() {
     let Some(device) = support::device() else { return };

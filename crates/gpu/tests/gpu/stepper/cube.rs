@@ -110,7 +110,7 @@ pub fn tet_block(cells: [u32; 3], size: [f64; 3]) -> (Vec<Vector<f64>>, Vec<[u32
     (all([nx + 1, ny + 1, nz + 1]).map(point).collect(), tets_of(&hexes))
 }
 
-/// One body of an element.
+/// Builds a body of one element type.
 fn body(
     element: &str,
     material: Material,
@@ -171,7 +171,7 @@ pub fn free_cube(element: &str, material: Material) -> Model {
 
 /// A cube without any order.
 pub struct Jumble {
-    /// With its base held.
+    /// Model with its base held.
     pub model: Model,
     /// A smooth displacement at random, with strains of up to a fifth.
     pub start: Vec<Vector<f64>>,
