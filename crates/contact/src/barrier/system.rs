@@ -11,7 +11,6 @@ use super::collisions::{NormalCollision, Stencil};
 use super::configuration::Configuration;
 use super::features::Features;
 use super::law::{Barrier, Slip};
-use super::step::BarrierStep;
 use crate::pose::{Leg, Stance};
 use crate::shape::Near;
 use crate::touch::{Contacts, Passage, With};
@@ -40,7 +39,7 @@ pub struct Meeting {
     pub gap: Option<f64>,
 }
 
-/// The contacts of a model. They act only in the steps that [`begin`](Self::begin) makes.
+/// The contacts of a model. They act only in steps ([`BarrierStep`](super::BarrierStep)).
 #[derive(Clone, Debug)]
 pub struct Barriers {
     pub(super) contacts: Arc<Contacts>,
@@ -123,37 +122,6 @@ impl Barriers {
     /// Returns, for each contact, the number of pairs that never touch because they coincide at rest.
     pub fn apart_counts(&self) -> Vec<usize> {
         self.groups.iter().map(Group::apart_count).collect()
-    }
-
-    /// Begins the first step, as [`BarrierStep::begin_next`] does the others.
-    pub fn begin(self, position: &[Vector3<f64>], motion: &[f64], times: [f64; 2]) -> BarrierStep {
-        BarrierStep::first(self, position, motion, times)
-    }
-
-    /// Whatever has no gap at places [m] and a time [s]: pairs within the distance to keep, nodes in walls,
-    /// and edges through triangles. With no regard to what came before.
-    pub fn meetings(self, position: &[Vector3<f64>], time: f64) -> Vec<Meeting> {
-        let none = vec![0.0; 6 * self.nodes];
-        let step = self.begin(position, &none, [time; 2]);
-        let Self { groups, nodes, wall_distances, .. } = &step.barriers;
-        let mut all = Vec::new();
-        let of = |contact: u32, at: &[u32], gap: Option<f64>| {
-            let node = at.iter().copied().find(|node| (*node as usize) < *nodes)?;
-            Some(Meeting { contact, node, place: position[node as usize].into(), gap })
-        };
-        for (group, distances) in groups.iter().zip(wall_distances) {
-            group.too_close(&step.now.place, |at, gap| all.extend(of(group.number, &at, Some(gap))));
-            if group.wall.is_some() {
-                let distances = group.sides[0].points.iter().zip(distances);
-                let gaps = distances.map(|(&node, distance)| (node, distance - group.parameters.kept));
-                all.extend(
-                    gaps.filter(|(_, gap)| *gap <= 0.0)
-                        .filter_map(|(node, gap)| of(group.number, &[node], Some(gap))),
-                );
-            }
-        }
-        step.intersections(|contact, ends, corners| all.extend(of(contact, &[ends[0], corners[0]], None)));
-        all
     }
 
     /// Lets surfaces be as large as rigid things are now.
