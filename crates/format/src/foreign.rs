@@ -30,7 +30,7 @@ const BY_WORD: [(&str, &str, &str); 3] = [
     ),
 ];
 
-/// What a file is and what to do, if its ending names the format of another program.
+/// Returns the kind of a file and advice, if its ending names the format of another program.
 ///
 /// ```
 /// let [what, help] = pliant_format::foreign_file("model.INP".as_ref()).unwrap();
@@ -43,7 +43,7 @@ pub fn foreign_file(path: &Path) -> Option<[&'static str; 2]> {
     own.map(|&(_, what, help)| [what, help])
 }
 
-/// The same of a text that is XML and not TOML.
+/// Returns the kind of a text and advice, if the text is XML and not TOML.
 pub(crate) fn foreign_text(text: &str) -> Option<[&'static str; 2]> {
     text.trim_start_matches('\u{feff}').trim_start().starts_with('<').then(|| {
         let own = BY_WORD.iter().find(|(word, ..)| text.contains(word));

@@ -2,8 +2,8 @@
 
 /// The known name that `word` was most likely meant to be, if any is near.
 ///
-/// Near is a third of the letters added, left out, changed or swapped, or one name at the beginning of the
-/// other; case, `-`, `_` and spaces don't count.
+/// A name is near if it begins the other, or if at most a third of the letters are added, left out, changed
+/// or swapped. Case, `-`, `_` and spaces don't count.
 pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let plain = |name: &str| name.to_lowercase().replace(['_', ' '], "-");
     let word = plain(word);

@@ -10,7 +10,7 @@ pub(crate) const LONGEST_SCENE: u64 = 1 << 26;
 /// Longest table and XML model [bytes].
 pub const LONGEST_TABLE: u64 = 1 << 30;
 
-/// Which files may be read.
+/// Files that may be read.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Reads {
     within: Option<PathBuf>,

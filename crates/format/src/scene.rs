@@ -25,8 +25,8 @@ pub struct Scene {
     pub scene: SceneTable,
     /// `[run]`
     pub run: RunTable,
-    /// `[participant.NAME]`, in the order of the file, as all below but bodies, obstacles, tools and
-    /// contacts: these are in the order of their names, with walls after the other bodies.
+    /// `[participant.NAME]`, in the order of the file, as most tables below. Bodies, obstacles, tools and
+    /// contacts are in the order of their names, with walls after the other bodies.
     pub participants: Vec<(String, ParticipantTable)>,
     /// `[law.NAME]`
     pub laws: Vec<(String, LawTable)>,
@@ -48,7 +48,7 @@ pub struct Scene {
     pub tools: Vec<(String, ToolTable)>,
     /// `[contact.NAME]`
     pub contacts: Vec<(String, ContactTable)>,
-    /// Those between a body of this scene and one of another participant.
+    /// Contacts between a body of this scene and a body of another participant.
     pub meets: Vec<(String, ContactTable)>,
     /// `[output.NAME]`
     pub outputs: Vec<(String, OutputTable)>,
@@ -56,9 +56,9 @@ pub struct Scene {
     pub view: ViewTable,
     /// Doubts about values by themselves.
     pub doubts: Vec<Diagnostic>,
-    /// Of the scene of one participant: the table that its run comes from.
+    /// Name of the participant's table that the run comes from, in the scene of one participant.
     pub own: Option<String>,
-    /// Whether it is the scene of one participant of several.
+    /// True if it is the scene of one participant of several.
     pub is_part: bool,
 }
 
@@ -80,7 +80,7 @@ const TABLES: [&str; 14] = [
     "view",
 ];
 
-/// Why a scene could not be read.
+/// Reason why a scene could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// The file can't be opened.
@@ -88,7 +88,7 @@ pub enum ReadError {
     File {
         /// Its path.
         path: PathBuf,
-        /// What the system says.
+        /// Message of the system.
         reason: String,
     },
     /// The file has mistakes.
@@ -109,7 +109,8 @@ pub fn open(path: &Path) -> Result<(Source, PathBuf), ReadError> {
     open_within(path, Reads::anywhere())
 }
 
-/// As [`open`], with the files that may be read: the scene file itself, and all that it names.
+/// Reads a scene file like [`open`], with the files that may be read: the scene file itself and all files
+/// that it names.
 ///
 /// # Errors
 /// If the file can't or may not be read, or is not TOML.

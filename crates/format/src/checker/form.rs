@@ -55,7 +55,7 @@ pub(crate) struct Form<'s> {
     pub(crate) words: Option<Vec<&'s str>>,
     pub(crate) properties: Vec<(&'s str, &'s Json)>,
     pub(crate) required: Vec<&'s str>,
-    /// What a table takes beside its properties.
+    /// Schema of the further keys of a table.
     pub(crate) additional: Option<&'s Json>,
     pub(crate) items: Option<&'s Json>,
     pub(crate) prefix: Vec<&'s Json>,
@@ -158,7 +158,7 @@ impl<'s> Form<'s> {
         self.properties.iter().find(|(name, _)| *name == key).map(|(_, schema)| *schema)
     }
 
-    /// Whether the value is of this form's kind.
+    /// True if the value is of this form's kind.
     pub(super) fn fits(&self, value: &Value) -> bool {
         match self.kind {
             None => true,
@@ -177,7 +177,7 @@ impl<'s> Form<'s> {
         self.property(key)?.get("const")?.as_str()
     }
 
-    /// The range of a number in words, "greater than 0 and at most 0.5"; empty where there is none.
+    /// The range of a number in words, "greater than 0 and at most 0.5"; empty without a range.
     pub(crate) fn range(&self) -> String {
         let of_type = |bound: &Bound| {
             [f32::MAX as f64, u32::MAX as f64, i32::MAX as f64, -(i32::MIN as f64)]
@@ -206,7 +206,7 @@ pub(crate) struct Forms<'s> {
 }
 
 impl<'s> Forms<'s> {
-    /// The forms that a value of this schema may take; "no value", which TOML cannot say, is none of them.
+    /// The forms that a value of this schema may take; "no value", which TOML cannot say, is left out.
     pub(crate) fn of(self, schema: &'s Json) -> Vec<Form<'s>> {
         let mut forms = Vec::new();
         for form in self.resolve(schema, Form::default(), 0) {

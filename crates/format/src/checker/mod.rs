@@ -2,9 +2,9 @@
 //! place.
 //!
 //! The schema is the one that schemars derives from the parameter struct: meaning, unit, range and default
-//! are declared there once. Whatever keys a table's schema does not name are mistakes, whether or not the
-//! struct denies unknown fields, because serde cannot deny them in structs with flattened parts. Names that
-//! only serde knows (`alias`) and the schema's `pattern`, `multipleOf` and `uniqueItems` are ignored.
+//! are declared there once. A key that a table's schema does not name is a mistake, even if the struct allows
+//! unknown fields. Serde cannot deny them in structs with flattened parts. Names that only serde knows
+//! (`alias`) and the schema's `pattern`, `multipleOf` and `uniqueItems` are ignored.
 
 mod form;
 #[cfg(test)]
@@ -37,11 +37,11 @@ pub fn check(node: &Node, path: &str, schema: &Schema, out: &mut Vec<Diagnostic>
     check_skipping(node, path, schema, &[], out)
 }
 
-/// Reads the table at `path` into its parameter struct; `None` where there was a mistake, which is then in
+/// Reads the table at `path` into its parameter struct; returns `None` after a mistake, which it adds to
 /// `out`.
 ///
 /// Keys in `skip` are left to the caller, such as the `type` that chose the struct. A table that the file
-/// lacks is read as an empty one: the defaults, or what is required and missing.
+/// lacks is read as an empty one: optional keys get their defaults, required keys are reported as missing.
 pub(crate) fn read_table<T: DeserializeOwned + JsonSchema>(
     source: &Source,
     path: &[&str],
@@ -99,7 +99,7 @@ impl fmt::Display for Trail<'_> {
 }
 
 impl Trail<'_> {
-    /// What messages begin with: "`law.parenchyma`: ".
+    /// Beginning of messages: "`law.parenchyma`: ".
     fn subject(&self) -> String {
         match self {
             Trail::Start("") => String::new(),
@@ -260,7 +260,7 @@ impl<'s> Checker<'s, '_> {
         self.report(diagnostic.help(hint).help(trail.explained(doc)))
     }
 
-    /// Whether a value in its range has a plausible size; reports one that is impossible or unlikely.
+    /// True if the size of a value is possible; reports impossible and unlikely sizes.
     fn is_possible(
         &mut self,
         node: &Node,

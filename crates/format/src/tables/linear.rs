@@ -1,11 +1,11 @@
-//! How the solvers `implicit` and `static` solve their equations.
+//! Settings for the equations of the solvers `implicit` and `static`.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Axis;
 
-/// How linear equations are solved: one word, or a table with settings.
+/// Solver of linear equations: one word, or a table with settings.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum LinearWay {
@@ -59,11 +59,12 @@ pub struct LinearTable {
     #[serde(default = "thousand")]
     #[schemars(range(min = 1, max = 1_000_000))]
     pub iterations: u32,
-    /// What conjugate gradients multiply residuals by.
+    /// Preconditioner, by which conjugate gradients multiply residuals.
     #[serde(default)]
     pub preconditioner: PreconditionerName,
-    /// Whether an `implicit` step goes on with what conjugate gradients have reached when their iterations
-    /// run out, instead of ending the run: bounded time, for real time. The summary tells the residual.
+    /// True if an `implicit` step accepts the result of conjugate gradients when their iterations run out,
+    /// instead of ending the run. This bounds the time of a step, for real time. The summary shows the
+    /// residual.
     #[serde(default)]
     pub accept_stalled: bool,
 }
@@ -89,7 +90,7 @@ fn thousand() -> u32 {
     1000
 }
 
-/// What conjugate gradients multiply residuals by.
+/// Preconditioner, by which conjugate gradients multiply residuals.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum PreconditionerName {
@@ -103,14 +104,15 @@ pub enum PreconditionerName {
     Aggregates,
 }
 
-/// What a static run prescribes instead of the size of one load: exactly one of `displacement`, `arc-length`,
-/// `volume`. It finds the factor of the load, equal in all its load steps.
+/// Quantity that a static run prescribes instead of the size of one load: exactly one of `displacement`,
+/// `arc-length`, `volume`. The run prescribes it in equal parts in its load steps, and finds the factor of
+/// the load.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ControlTable {
     /// The load whose factor is found; it has no curve of its own.
     pub load: String,
-    /// How a node moves over the whole run, in equal parts.
+    /// Motion of a node over the whole run, in equal parts.
     #[serde(default)]
     pub displacement: Option<ControlledNode>,
     /// Length [m] that all displacements together go in a load step, √Σ|Δu|². The path ends where `stop`
@@ -118,8 +120,8 @@ pub struct ControlTable {
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub arc_length: Option<f64>,
-    /// Where a path by `arc-length` ends before its last load step; if not given, at a load factor of 1,
-    /// where the load is as written.
+    /// End of a path by `arc-length` before its last load step. If not given, a load factor of 1, where the
+    /// load is as written.
     #[serde(default)]
     pub stop: Option<StopTable>,
     /// Volume [m³] that the pressurised triangles, which must be closed, enclose at the end; it changes in
@@ -129,7 +131,7 @@ pub struct ControlTable {
     pub volume: Option<f64>,
 }
 
-/// Where a path by arc length ends: at the first state that meets one of these.
+/// End of a path by arc length: the first state that meets one of these conditions.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct StopTable {
@@ -137,7 +139,7 @@ pub struct StopTable {
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub load_factor: Option<f64>,
-    /// How far a node has moved.
+    /// Displacement of a node.
     #[serde(default)]
     pub displacement: Option<ControlledNode>,
     /// Number of limit points passed, where the load turns round.
@@ -146,12 +148,12 @@ pub struct StopTable {
     pub limit_points: Option<u32>,
 }
 
-/// How an implicit run goes on in time.
+/// Time integrator of an implicit run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum IntegratorName {
-    /// Backward Euler, of first order: robust, and it damps a vibration of f hertz in steps of h seconds by
-    /// about π f h of critical.
+    /// Backward Euler, of first order: robust. In steps of h seconds it damps a vibration of f hertz by about
+    /// π f h of critical damping.
     #[default]
     BackwardEuler,
     /// The backward differentiation formula of second order: it damps by about 62 (f h)³ of critical, and
@@ -167,8 +169,8 @@ pub struct ControlledNode {
     pub body: String,
     /// Place at rest [m]; its nearest node is meant.
     pub at: [f64; 3],
-    /// Which component.
+    /// Component of the displacement.
     pub component: Axis,
-    /// How far it moves in the end [m].
+    /// Displacement at the end [m].
     pub by: f64,
 }

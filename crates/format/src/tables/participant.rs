@@ -17,27 +17,27 @@ use super::{
 pub struct ParticipantTable {
     /// The bodies: solids or shells, with the solvers `implicit` and `static` also both.
     pub bodies: Vec<String>,
-    /// As in `[run]`.
+    /// Same as in `[run]`.
     #[serde(default)]
     pub solver: Option<SolverName>,
     /// Time step [s], as in `[run]`. Common instants are as far apart as the longest step of all
     /// participants; shorter steps are made a little shorter where they don't divide it.
     #[serde(default)]
     pub step: Option<StepChoice>,
-    /// As in `[run]`.
+    /// Same as in `[run]`.
     #[serde(default)]
     pub on_unstable: Option<OnUnstableName>,
-    /// As in `[run]`.
+    /// Same as in `[run]`.
     #[serde(default)]
     pub mass_scaling: Option<MassScalingTable>,
-    /// As in `[run]`.
+    /// Same as in `[run]`.
     #[serde(default)]
     pub load_steps: Option<LoadSteps>,
-    /// As in `[run]`.
+    /// Same as in `[run]`.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub tolerance: Option<f64>,
-    /// As in `[run]`.
+    /// Same as in `[run]`.
     #[serde(default)]
     #[schemars(range(min = 1, max = 10_000))]
     pub iterations: Option<u32>,
@@ -45,28 +45,28 @@ pub struct ParticipantTable {
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub speed_tolerance: Option<f64>,
-    /// As in `[run]`.
+    /// Same as in `[run]`.
     #[serde(default)]
     pub accept_unconverged: Option<bool>,
-    /// As in `[run]`.
+    /// Same as in `[run]`.
     #[serde(default)]
     pub integrator: Option<IntegratorName>,
-    /// As in `[run]`.
+    /// Same as in `[run]`.
     #[serde(default)]
     pub linear: Option<LinearWay>,
-    /// As in `[run]`.
+    /// Same as in `[run]`.
     #[serde(default)]
     pub control: Option<ControlTable>,
-    /// As in `[run]`.
+    /// Same as in `[run]`.
     #[serde(default)]
     pub precision: Option<PrecisionName>,
-    /// As in `[run]`.
+    /// Same as in `[run]`.
     #[serde(default)]
     pub device: Option<DeviceName>,
-    /// As in `[run]`.
+    /// Same as in `[run]`.
     #[serde(default)]
     pub adapter: Option<String>,
-    /// As in `[run]`.
+    /// Same as in `[run]`.
     #[serde(default)]
     pub design: Option<DesignName>,
 }
