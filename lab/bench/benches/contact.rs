@@ -24,7 +24,7 @@ fn main() {
     measure("folded sheet with itself", with_itself(folded(), false));
 }
 
-/// How long a thing is called before it is measured, and while.
+/// Duration of the calls before the measurement, and of the measurement.
 const WARM_UP: Duration = Duration::from_millis(300);
 const MEASURED: Duration = Duration::from_secs(4);
 
@@ -50,7 +50,7 @@ fn measure(name: &str, mut call: impl FnMut() -> f64) {
     println!("{name:24} {count:7} {p50:8.1} {p95:8.1} {p99:8.1} {most:8.1}  {processor:9.1} {rate:8.0}");
 }
 
-/// Processor time [s] of this thread, where Linux tells it.
+/// Processor time [s] of this thread; `None` except on Linux.
 fn processor_time() -> Option<f64> {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
     let nanoseconds: f64 = text.split_whitespace().next()?.parse().ok()?;
@@ -66,7 +66,7 @@ const PASSES: usize = 16;
 
 struct Ball {
     faces: Vec<[u32; 3]>,
-    /// Where the nodes are in each pass: they swing by 0.1 mm, a sixteenth of an edge.
+    /// Positions of the nodes in each pass: they swing by 0.1 mm, a sixteenth of an edge.
     passes: Vec<Vec<Vector3>>,
     pass: usize,
 }
@@ -130,8 +130,8 @@ fn points_in_a_grid() -> impl FnMut() -> f64 {
     move || points.iter().map(|point| grid.near(point).distance.abs()).sum()
 }
 
-/// A sheet of 20,736 triangles with edges of 1 mm whose halves lie face to face, 0.2 mm apart, and swing: all
-/// of its nodes are near others.
+/// A sheet of 20,736 triangles with edges of 1 mm. Its halves lie face to face, 0.2 mm apart, and swing: all
+/// nodes are near others.
 fn folded() -> Ball {
     let (columns, rows) = (144, 72);
     let node = |i: u32, j: u32| j * (columns + 1) + i;

@@ -10,7 +10,7 @@ use pliant_mechanics::model::Contradiction;
 
 /// A model that can be timed.
 pub trait Timed {
-    /// Why a step can fail.
+    /// Error of a step.
     type Error;
 
     /// The warm-up steps until a batch takes a quarter of this time [s].
@@ -132,7 +132,7 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// Of some values.
+    /// Returns the spread of some values.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
         let mut values: Vec<f64> = values.into_iter().collect();
         values.sort_unstable_by(f64::total_cmp);

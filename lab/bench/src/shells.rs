@@ -1,5 +1,5 @@
-//! Implicit steps of shells: a tube like a bowel (radius 20 mm, length 200 mm, wall 2 mm, E = 0.1 MPa, ν =
-//! 0.45, both ends fixed) under a pressure that pulses between 0 and 1 kPa twice a second, in steps of 40 ms
+//! Implicit steps of shells. The body is a tube like a bowel (radius 20 mm, length 200 mm, wall 2 mm, E = 0.1
+//! MPa, ν = 0.45, both ends fixed). Its pressure pulses between 0 and 1 kPa twice a second, in steps of 40 ms
 //! with one linear solution each. Conjugate gradients run to a residual of 0.1 % on the CPU, and on the best
 //! GPU.
 
@@ -28,7 +28,7 @@ use crate::{Machine, Spread as Times};
 pub const SHELL_STEP: f64 = 0.04;
 /// Residual over the loads at which conjugate gradients stop.
 const TOLERANCE: f64 = 1e-3;
-/// Shells of each tube, and steps measured of it.
+/// Number of shells of each tube, and number of measured steps.
 const TUBES: [(usize, usize); 4] = [(800, 50), (4000, 40), (20_000, 20), (50_000, 10)];
 /// Steps before those that count: drivers compile kernels in the first one.
 const WARM_UP: usize = 3;
@@ -73,7 +73,7 @@ pub fn tube(shells: usize) -> Result<Assembly, ModelError> {
     Ok(model)
 }
 
-/// What steps of a tube took.
+/// Cost of the steps of a tube.
 #[derive(Clone, Debug)]
 pub struct ShellRun {
     /// Shells.
@@ -86,7 +86,7 @@ pub struct ShellRun {
     pub steps: usize,
     /// The largest residual over the loads.
     pub residual: f64,
-    /// Where it ended.
+    /// State at the end.
     pub last: State,
 }
 

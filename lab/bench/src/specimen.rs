@@ -35,7 +35,7 @@ pub enum Hexes {
 pub struct Specimen {
     /// Its mesh.
     pub mesh: Mesh,
-    /// The model of it.
+    /// Its model.
     pub model: Model,
 }
 
@@ -139,8 +139,8 @@ impl Specimen {
         self.constrain("fix", face, components, Motion::Fixed)
     }
 
-    /// With x held on `x-min`, y on `y-min` and z on `z-min`: an eighth of a symmetric body, or a block that
-    /// may change its width.
+    /// Holds x on `x-min`, y on `y-min` and z on `z-min`. This makes an eighth of a symmetric body, or a
+    /// block that may change its width.
     #[must_use]
     pub fn on_rollers(self) -> Self {
         let [x, y, z] = [0, 1, 2].map(|axis| [0, 1, 2].map(|c| c == axis));

@@ -70,11 +70,11 @@ pub struct Row {
     pub computed: Option<f64>,
     /// The tolerance, in the unit of the row.
     pub tolerance: Option<f64>,
-    /// Whether it is within the tolerance; `None` without one.
+    /// True if it is within the tolerance; `None` without one.
     pub pass: Option<bool>,
     /// The source of the reference.
     pub source: &'static str,
-    /// Whether the number depends on the machine.
+    /// True if the number depends on the machine.
     #[serde(skip)]
     pub machine: bool,
 }

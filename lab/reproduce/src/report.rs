@@ -28,12 +28,12 @@ impl Report {
         Self { cases: done, machine: Machine::this(), date: time::OffsetDateTime::now_utc().date() }
     }
 
-    /// All rows.
+    /// Returns all rows.
     pub fn rows(&self) -> impl Iterator<Item = &Row> {
         self.cases.iter().flat_map(|(_, findings, _)| &findings.rows)
     }
 
-    /// How many rows passed and how many failed; the others are not judged.
+    /// Number of rows that passed and number that failed; the others are not judged.
     pub fn counts(&self) -> [usize; 2] {
         [true, false].map(|pass| self.rows().filter(|row| row.pass == Some(pass)).count())
     }

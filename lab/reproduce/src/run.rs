@@ -95,7 +95,8 @@ pub fn relax(model: &Model) -> Result<Equilibrium, CaseError> {
     Equilibrium::of(&mut relaxed(model, 1.0, Some(1e-8))?)
 }
 
-/// The same at a time [s], to a relative residual, that of double precision if not given.
+/// Runs to the equilibrium at a time [s], to a relative residual; the residual of double precision if not
+/// given.
 pub(crate) fn relaxed(model: &Model, until: f64, tolerance: Option<f64>) -> Result<Simulation, CaseError> {
     let mut part = Part::quasi_static(NAME, model.clone(), until, 1);
     part.method = Method::QuasiStatic { precision: Precision::Double, tolerance };

@@ -27,7 +27,7 @@ pub struct Element {
     /// Its name in a scene.
     pub name: &'static str,
     tets: Tets,
-    /// Of the cantilever and of the cube.
+    /// Hexes of the cantilever and of the cube.
     hexes: Option<[Hexes; 2]>,
 }
 

@@ -1,7 +1,7 @@
 //! Figure 6.9: the cost of the framework. The bare step of a cube of hexahedra under gravity is compared with
-//! the whole program on this machine, without and with a series of meshes, in single precision on all cores;
-//! so is `scenes/liver`, without and with all its outputs. All start at rest and take the same steps of the
-//! same model; repeats are interleaved, so other load affects all equally.
+//! the whole program, without and with a series of meshes. `scenes/liver` is compared likewise, without and
+//! with all its outputs. Everything runs on this machine, in single precision on all cores. All start at rest
+//! and take the same steps of the same model; repeats are interleaved, so other load affects all equally.
 
 use pliant_bench::{Clocked, Spread, Timed};
 use pliant_explicit::State;
@@ -37,7 +37,7 @@ pub(crate) const CASE: Case = Case {
     compute,
 };
 
-/// The cube with so many elements along its edge, for so many seconds.
+/// Scene of the cube with `cells` elements along its edge, until a time [s].
 fn scene(cells: usize, until: f64, series: &str) -> Result<Scene, CaseError> {
     let text = format!(
         "[scene]\nuntil = {until:?}\ngravity = [0, 0, -9.81]\n[run]\nprecision = \"single\"\n[law.tissue]\n\

@@ -2,8 +2,8 @@
 //! some seconds after the stretch. The organ is the one of `scenes/liver`, since the thesis's mesh was never
 //! published.
 //!
-//! The source has no numbers. Instead: after relaxation, the tissue must equal an elastic one of modulus (1 −
-//! α) μ, (1 − α) η and the same κ in equilibrium, which another solver computes.
+//! The source has no numbers. Instead, another solver computes an elastic equilibrium with the moduli (1 − α)
+//! μ and (1 − α) η and the same κ. After relaxation, the tissue must equal it.
 
 use pliant_format::Scene;
 use pliant_format::source::Source;

@@ -1,7 +1,7 @@
 //! Figures 9.1 to 9.3: fine surfaces as few curved shells. The thesis prints no numbers beside its maps of
 //! the distance from shells to surface; here both directions are measured, densely. The capsule and the
 //! aneurysm are analytic, since the thesis's are not published. If `PLIANT_DATA` names a folder of organs,
-//! those of patients are shown as well.
+//! organs of patients are shown as well.
 
 use std::f64::consts::TAU;
 use std::path::Path;
