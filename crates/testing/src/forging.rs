@@ -45,8 +45,8 @@ const LARGE: [&[u8]; 3] = [
 /// Lengths, counts and flags lie among the first and the last bytes, before and after long lists of numbers.
 const ENDS: usize = 200;
 
-/// Bytes with a few changes: as [`Random::damaged`] makes them, anywhere or near an end; a rare number in
-/// place of eight; a large count in place of one.
+/// Returns bytes with a few changes: changes of [`Random::damaged`] anywhere or near an end, a rare number in
+/// place of eight bytes, or a large count in place of one byte.
 pub fn forged(random: &mut Random, bytes: &[u8]) -> Vec<u8> {
     let far = bytes.len().saturating_sub(ENDS);
     let mut changed = bytes.to_vec();
@@ -77,10 +77,10 @@ pub fn forged(random: &mut Random, bytes: &[u8]) -> Vec<u8> {
     }
 }
 
-/// What inputs came to.
+/// Results of the attempts with inputs.
 #[derive(Debug, Default)]
 pub struct Attempts {
-    /// Those that were taken, and those that were refused.
+    /// Number of inputs that were taken, and of inputs that were refused.
     pub taken: u64,
     /// See [`taken`](Self::taken).
     pub refused: u64,

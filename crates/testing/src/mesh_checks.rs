@@ -88,7 +88,7 @@ pub fn pinched(faces: &[Vec<u32>]) -> Vec<u32> {
             others.entry(node).or_default().push([face[(at + 1) % 3], face[(at + 2) % 3]]);
         }
     }
-    // From the first face on to the next by the edge that both have: one fan comes back after all of them.
+    // Goes from the first face to the next across their common edge: a single fan returns after all faces.
     let is_one_fan = |links: &Vec<[u32; 2]>| {
         let (mut at, mut length) = (links[0][1], 1);
         while at != links[0][0] {
@@ -130,8 +130,8 @@ fn rotated(mut face: Vec<u32>) -> Vec<u32> {
     face
 }
 
-/// The boundary, outward, after checking that every inner face belongs to two cells that see it from opposite
-/// sides, that no face belongs to more, and that every point belongs to a cell.
+/// Returns the boundary, outward. Checks that every inner face belongs to two cells on opposite sides, that
+/// no face belongs to more, and that every point belongs to a cell.
 pub fn conforming_boundary(mesh: &Mesh) -> Vec<Vec<u32>> {
     let [block] = &mesh.blocks[..] else { panic!("one block expected") };
     let mut faces: BTreeMap<Vec<u32>, usize> = BTreeMap::new();
@@ -161,7 +161,7 @@ fn sorted(face: &[u32]) -> Vec<u32> {
     nodes
 }
 
-/// How often each edge occurs in the faces.
+/// Number of times that each edge occurs in the faces.
 pub fn edge_counts(faces: &[Vec<u32>]) -> BTreeMap<[u32; 2], usize> {
     let mut edges = BTreeMap::new();
     for face in faces {

@@ -94,8 +94,8 @@ pub fn last_row(text: &str) -> BTreeMap<String, f64> {
     last_row_in(&out.path().join("out"))
 }
 
-/// Compares two rows: the columns whose names have a word differ by less than its limit, as a part of the
-/// largest of them in the first.
+/// Compares two rows. Columns whose names contain a word differ by less than the word's limit, relative to
+/// the largest of their values in the first row.
 #[track_caller]
 pub fn assert_rows_agree(what: &str, [one, other]: [&BTreeMap<String, f64>; 2], limits: &[(&str, f64)]) {
     for (word, limit) in limits {
@@ -114,8 +114,8 @@ pub fn last_row_in(folder: &Path) -> BTreeMap<String, f64> {
     names.zip(table.lines().last().unwrap().split(',').map(|value| value.parse().unwrap())).collect()
 }
 
-/// A run of 1 s that is cut off at 0.4 s and taken up again writes the same last row as one without a stop,
-/// and looks on the way change no bit.
+/// Checks that a run of 1 s that is cut off at 0.4 s and resumed writes the same last row as a run without a
+/// stop. Snapshots on the way change no bit.
 pub fn resumes(text: &str) {
     let whole = world(text).unwrap();
     let half = world(&text.replace("until = 1", "until = 0.4")).unwrap();
@@ -125,8 +125,8 @@ pub fn resumes(text: &str) {
     assert_eq!(a.lines().last(), b.lines().last(), "{text}");
 }
 
-/// A run that goes on from states taken at instants whose forces are found, and after steps that were
-/// stopped, ends in the same bits as one at which nobody looks.
+/// Checks that snapshots change nothing. A run continues from snapshots at instants whose forces are
+/// computed, and after steps that were stopped. It ends in the same bits as a run without snapshots.
 pub fn looks_change_nothing(world: &World) {
     let mut whole = world.simulation().unwrap();
     let steps = world.steps();
@@ -285,7 +285,7 @@ impl Workshop {
         all
     }
 
-    /// All files in a folder with their contents, except checkpoints and the page with the wall time.
+    /// Returns all files in a folder with their contents, except checkpoints and the page with the wall time.
     pub fn files(&self, folder: &str) -> Vec<(PathBuf, Vec<u8>)> {
         let folder = self.path(folder);
         let (mut all, mut open) = (Vec::new(), vec![folder.clone()]);
@@ -329,12 +329,12 @@ impl Workshop {
     }
 
     /// Runs the scene with the values of some keys set, as `pliant run` does. The outputs are in `out/case`;
-    /// those of an earlier run there are replaced.
+    /// the outputs of an earlier run there are replaced.
     pub fn run(&self, set: &[&str]) -> Told {
         self.run_into("out/case", set)
     }
 
-    /// As [`run`](Self::run), with the outputs in another folder.
+    /// Runs the scene like [`run`](Self::run), with the outputs in another folder.
     pub fn run_into(&self, out: &str, set: &[&str]) -> Told {
         self.go(None, out, set)
     }
@@ -348,7 +348,7 @@ impl Workshop {
         self.go(Some(checkpoint), out.to_str().expect("a path in UTF-8"), set)
     }
 
-    /// As [`resume`](Self::resume), with the outputs in another folder.
+    /// Resumes a run like [`resume`](Self::resume), with the outputs in another folder.
     pub fn resume_in(&self, checkpoint: &str, out: &str) -> Told {
         self.go(Some(checkpoint), out, &[])
     }
@@ -452,7 +452,7 @@ impl Workshop {
     }
 }
 
-/// What a check or a run of a scene found.
+/// Output of a check or a run of a scene.
 #[derive(Debug, Default)]
 pub struct Told {
     /// The description of a scene that was checked.
@@ -466,7 +466,7 @@ pub struct Told {
 }
 
 impl Told {
-    /// Adds what is shown of mistakes or warnings.
+    /// Adds the texts of mistakes or warnings that are shown.
     fn show(&mut self, errors: &SceneErrors) {
         let all = errors.diagnostics();
         if all.len() > 1 {
@@ -519,7 +519,7 @@ impl Told {
         self.err.split_whitespace().collect::<Vec<_>>().join(" ")
     }
 
-    /// Whether something is underlined in this line of the scene.
+    /// True if something is underlined in this line of the scene.
     pub fn underlines(&self, line: &str) -> bool {
         self.underlined.iter().any(|own| own.trim_end() == line)
     }

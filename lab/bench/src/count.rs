@@ -21,7 +21,7 @@
 //! | volumetric stress of an averaged pressure | 45 | cof F 27, times p and sum 18 |
 //! | P = F S | 45 | |
 //! | V P, f_a = V P B_a, f_0 = −Σ f_a | 9 + 15 (N−1) + 3 (N−2) | |
-//! | hourglass control (`hex8`) | 295 | Σ Γ u 48, less H Y 72, energy 26, k q 12, V P 72, Σ Γ k q 60, test 5 |
+//! | hourglass control (`hex8`) | 295 | Σ Γ u 48, less H Y 72, energy 26, k q 12, V P 72, Σ Γ k q 60, 5 |
 //! | sums of blocks | 3 N | |
 //! | a node's step | 79 | per component 24, of which 12 are energies; 7 once |
 //!

@@ -1,5 +1,5 @@
-//! Brain shift on an ellipsoid (the setting is in `brain_shift` of the library), held to a converged solution
-//! of quadratic tets at 52 points inside and, mesh by mesh, to two other codes.
+//! Brain shift on an ellipsoid (the setting is in `brain_shift` of the library). The references are a
+//! converged solution of quadratic tets at 52 points inside and, mesh by mesh, two other codes.
 
 use pliant_geometry::{Mesh, Vector3, boundary, io};
 use pliant_validation::brain_shift::{ANP, Shifted, mesh, off_on_the_same_mesh, reference_mesh, stuffed};

@@ -10,8 +10,8 @@ use pliant_validation::{
 };
 use serde_json::{Value, json};
 
-/// A block of soft tissue held at one end, under a gravity so small that its strain, 1e-4 at most, leaves the
-/// limit where it is at rest.
+/// A block of soft tissue held at one end under a small gravity. Its strain, at most 1e-4, leaves the
+/// critical step as at rest.
 fn block(cells: VolumeCell) -> Specimen {
     Specimen::block([0.1, 0.05, 0.05], [8, 4, 4], cells, &elastic(soft_tissue()), [0.0; 3])
         .fix("x-min", [true; 3])

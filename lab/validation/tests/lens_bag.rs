@@ -10,12 +10,12 @@ use pliant_geometry::{CellKind, Mesh};
 use pliant_scene::World;
 use rayon::prelude::*;
 
-/// Where the tube ends along y [m].
+/// End of the tube along y [m].
 const TUBE_ENDS: f64 = 30e-3;
 /// The size of the force [N] between the lens and the bag above which they touch: the lens weighs 0.14 mN.
 const TOUCHES: f64 = 1e-4;
 
-/// How far the bag gives way at least [m] where the lens lies in it.
+/// Least displacement [m] of the bag where the lens lies in it.
 const GIVES: f64 = 3e-5;
 
 /// Layers of the lens, 0.3 mm thick, keep this distance of their middle surfaces at least [m].

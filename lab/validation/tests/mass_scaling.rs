@@ -44,7 +44,7 @@ fn scaled(model: &Model, goal: Goal) -> Model {
     model
 }
 
-/// Added mass over that of the material.
+/// Added mass over the mass of the material.
 fn share(model: &Model) -> f64 {
     model.mass_scaling.as_ref().unwrap().total() / model.mass.iter().sum::<f64>()
 }

@@ -1,5 +1,5 @@
-//! A finger that presses 15 mm into a liver and sweeps over it at 100 mm/s, again and again: no node goes far
-//! into the finger, its force does not jump, and energies stay sound.
+//! A finger that presses 15 mm into a liver and sweeps over it at 100 mm/s, again and again. No node goes far
+//! into the finger, the force does not jump, and energies stay sound.
 
 use std::fmt::Write;
 use std::path::Path;

@@ -14,8 +14,8 @@ use pliant_validation::{
 };
 use serde_json::Value;
 
-/// A load step that comes to no equilibrium, halved or not, leaves displacements, history and work as they
-/// were, bit for bit: the same step by a patient solver then ends where it would have ended.
+/// A load step that finds no equilibrium, even when halved, leaves displacements, history and work unchanged,
+/// bit for bit. A solver with more iterations can then take the same step.
 #[test]
 fn a_failed_load_step_leaves_the_state_untouched() {
     let material =

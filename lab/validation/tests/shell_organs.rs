@@ -1,6 +1,6 @@
 //! Shells of real shapes, read through `PLIANT_DATA`: the leaflets of a patient's aortic valve closing under
-//! their pressure, an aneurysm and a rectum blown up. What is told: time, residual, and how far the answer
-//! moves with the mesh and with the numbering.
+//! their pressure, an aneurysm and a rectum blown up. The tests print the time, the residual, and the changes
+//! of the answer with the mesh and with the numbering.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -219,7 +219,7 @@ fn largest(model: &Assembly, state: &State) -> f64 {
 }
 
 /// The largest difference of displacements over the largest displacement; `map` leads from a node of the
-/// first to that of the second.
+/// first to the same node of the second.
 fn apart(one: &(Assembly, State), other: &(Assembly, State), map: impl Fn(usize) -> usize) -> f64 {
     let differences = (0..one.0.rest.len())
         .map(|n| (one.1.displacement(&one.0, n) - other.1.displacement(&other.0, map(n))).norm());
@@ -311,14 +311,15 @@ fn gap(model: &Assembly, state: &State, leaflet: &[usize], node: usize, limit: f
     least
 }
 
-/// Leaflets of a patient's valve (E = 1 MPa, ν = 0.45, t = 0.4 mm, 1000 kg/m³, as their deck says in mm, g
-/// and s: pressures in Pa, damping 2/s), each fixed along the wall, under the pressure of the deck.
+/// Leaflets of a patient's valve, each fixed along the wall, under the pressure of their deck. E = 1 MPa, ν =
+/// 0.45, t = 0.4 mm, 1000 kg/m³ and a damping of 2/s are from the deck. The deck is in mm, g and s, so
+/// pressures are in Pa.
 struct Valve {
     model: Assembly,
     cells: Vec<[u32; 3]>,
-    /// Which leaflet each node is of.
+    /// Leaflet of each node.
     leaflet: Vec<usize>,
-    /// Nodes fixed to the wall, and those of free edges.
+    /// Nodes fixed to the wall, and nodes of free edges.
     held: Vec<u32>,
     free: Vec<u32>,
     notes: String,
@@ -335,7 +336,7 @@ fn valve(folder: &Path, fine: bool) -> Valve {
         let first = points.len() as u32;
         for (edge, nodes) in [("edge1", &mut held), ("edge2", &mut free)] {
             let line = surface(folder.join(format!("PAT003_07_{name}_{edge}.vtp")), 10e-3).points;
-            // Nodes of the edge, and the middles between two of them.
+            // Nodes of the edge, and the middles between two neighbours.
             let on_edge = |p: &Vector3| {
                 let near = |w: &Vector3| (w - p).norm() < 1e-6;
                 line.iter().any(near)
@@ -421,9 +422,9 @@ fn valve_leaflets_close() {
     );
 }
 
-/// The part of a grid of lines along the axis of the valve, within four fifths of the radius of its wall,
-/// that no leaflet is in the way of: each is half as thick on either side of its middle surface as two keep
-/// from each other [m].
+/// The part of a grid of lines along the axis of the valve that no leaflet blocks. The grid lies within four
+/// fifths of the radius of the wall. A leaflet has the thickness `apart` [m], the distance that two leaflets
+/// keep.
 fn leak(valve: &Valve, state: &State, apart: f64) -> f64 {
     let wall: Vec<Vector3> = valve.held.iter().map(|&n| state.position[n as usize]).collect();
     let centre = wall.iter().sum::<Vector3>() / wall.len() as f64;

@@ -118,8 +118,8 @@ fn pressed(law: AnyLaw, element: (VolumeCell, Tets, Hexes)) -> Specimen {
     cube
 }
 
-/// The estimate over the critical time step of the deformed states of a run: the least and the largest, and
-/// the largest over what looking closely at every cell gives.
+/// Ratios of the estimate to the critical time step in the deformed states of a run: the least and the
+/// largest. The third is the largest ratio to the estimate from a close look at every cell.
 fn estimates(what: &str, specimen: &Specimen, until: f64) -> [f64; 3] {
     let model = &specimen.model;
     let (limit, at_rest) = (specimen.critical_step(), vec![[0.0; 3]; model.node_count()]);
@@ -151,9 +151,9 @@ fn the_estimate_stays_within_its_reserve_of_the_critical_step_of_deformed_bodies
     let uniform = Hexes::UniformStrain(HOURGLASS);
     let averaged = Tets::Averaged(Averaging::Nodal);
     for (name, law) in laws() {
-        // What is kept in reserve for it. Fibres that carry tension only are half stiff at rest, between two
-        // slopes, and no limit found there knows the full one: for them the rest of 0.9 of the limit at rest
-        // must do.
+        // Reserve of the estimate. Fibres that carry tension only are half stiff at rest, between two slopes,
+        // so a limit found at rest misses their full stiffness. For these fibres 0.9 of the limit at rest has
+        // to be enough.
         let allowed = if name == "holzapfel-gasser-ogden" { 1.0 / 0.9 } else { 1.0 / KEEP };
         for cells in CELLS {
             let gravity = 9.81 * law.small_strain().shear / 1000.0;
@@ -273,7 +273,8 @@ fn cut_steps_have_the_same_bits_on_any_number_of_threads_and_after_a_restart() {
     assert!(alone.stability.cuts > 0 && alone.stability.critical_steps > 0, "the test needs changes");
     assert!(alone == on(2) && alone == on(8));
 
-    // A copy of the state, taken anywhere between two instants, goes on alike on a stepper of its own.
+    // A copy of the state, taken anywhere between two instants, continues with the same bits on a stepper of
+    // its own.
     for parts in [40_u32, 97, 131] {
         let (mut stepper, mut state) = (fresh(), State::at_rest(&block.model));
         for _ in 0..parts {

@@ -98,8 +98,8 @@ fn distorted_block(cells: VolumeCell) -> Mesh {
     mesh
 }
 
-/// On rollers, free to widen, with damping near critical for the slowest vibration, a shear wave between a
-/// held and a free face: ω = π/2 √(μ/ρ)/L.
+/// Makes a block on rollers, free to widen. Damping is near critical for the slowest vibration, a shear wave
+/// between a held and a free face: ω = π/2 √(μ/ρ)/L.
 fn specimen(tissue: &Tissue, cells: VolumeCell) -> Specimen {
     let slowest = std::f64::consts::FRAC_PI_2 * (tissue.law.small_strain().shear / 1000.0).sqrt() / EDGE;
     let material = elastic(tissue.law);

@@ -73,8 +73,8 @@ every = 0.004
 probes.middle = { on = "block", at = [0.05, 0.05, 0.05] }
 "#;
 
-/// A strip of 100 by 20 by 2 mm that is held at one end and bends under its weight: `body` has its keys of
-/// mesh and model (see [`SHELL`], [`HEXES`]), `run` those of the table `[run]`.
+/// A strip of 100 by 20 by 2 mm that is held at one end and bends under its weight. `body` has its keys of
+/// mesh and model (see [`SHELL`], [`HEXES`]), `run` the keys of the table `[run]`.
 pub fn strip(body: &str, run: &str) -> String {
     format!(
         r#"[scene]
