@@ -1,7 +1,7 @@
-//! Helpers of tests: random numbers that are the same in every run, files with [random damage](forging),
-//! hexahedra of simple bodies, and the memory of the process. The feature `images` adds image files, `organs`
-//! label images and meshes of analytic organs. The feature `pieces` adds small bodies that meet, and `scenes`
-//! scenes that are checked and run.
+//! Helpers of tests: reproducible random numbers, files with [random damage](forging), hexahedra of simple
+//! bodies, and the memory of the process. The feature `images` adds image files, `organs` label images and
+//! meshes of analytic organs. The feature `pieces` adds small bodies that meet, and `scenes` scenes that are
+//! checked and run.
 //!
 //! ```
 //! let mut random = pliant_testing::Random::new(1);

@@ -130,8 +130,8 @@ fn rotated(mut face: Vec<u32>) -> Vec<u32> {
     face
 }
 
-/// Returns the boundary, outward. Checks that every inner face belongs to two cells on opposite sides, that
-/// no face belongs to more, and that every point belongs to a cell.
+/// Returns the boundary, outward. Checks that every inner face belongs to two cells on opposite sides, no
+/// face to more, and every point to a cell.
 pub fn conforming_boundary(mesh: &Mesh) -> Vec<Vec<u32>> {
     let [block] = &mesh.blocks[..] else { panic!("one block expected") };
     let mut faces: BTreeMap<Vec<u32>, usize> = BTreeMap::new();

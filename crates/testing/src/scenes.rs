@@ -114,8 +114,8 @@ pub fn last_row_in(folder: &Path) -> BTreeMap<String, f64> {
     names.zip(table.lines().last().unwrap().split(',').map(|value| value.parse().unwrap())).collect()
 }
 
-/// Checks that a run of 1 s that is cut off at 0.4 s and resumed writes the same last row as a run without a
-/// stop. Snapshots on the way change no bit.
+/// Checks that a run of 1 s, cut off at 0.4 s and resumed, writes the same last row as a run without a stop.
+/// Snapshots on the way change no bit.
 pub fn resumes(text: &str) {
     let whole = world(text).unwrap();
     let half = world(&text.replace("until = 1", "until = 0.4")).unwrap();
