@@ -76,7 +76,7 @@ pub struct Diagnostic {
     pub label: String,
     /// Advice to the user.
     pub help: Option<String>,
-    /// Other places that have to do with it, each with its label.
+    /// Other places of the mistake, each with its label.
     pub also: Vec<(Range<usize>, String)>,
 }
 
@@ -303,7 +303,7 @@ impl SceneErrors {
         Some((before.matches('\n').count() + 1, before[line_start..].chars().count() + 1))
     }
 
-    /// For logs, one finding a line: `liver.toml:12:17: error: … (help: …)`.
+    /// Returns text for logs, one finding a line: `liver.toml:12:17: error: … (help: …)`.
     pub fn plain(&self) -> impl fmt::Display + '_ {
         Plain(self)
     }
@@ -318,7 +318,7 @@ impl SceneErrors {
         self.diagnostics.len() - self.shown().len()
     }
 
-    /// The diagnostic that stands for the whole where there is just one.
+    /// Returns the diagnostic if there is only one.
     fn single(&self) -> Option<&Diagnostic> {
         match self.diagnostics.as_slice() {
             [diagnostic] => Some(diagnostic),

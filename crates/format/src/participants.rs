@@ -12,7 +12,7 @@ use crate::tables::{
 };
 
 impl ConstraintTable {
-    /// The body whose nodes it is about.
+    /// The body whose nodes the table concerns.
     pub fn body(&self) -> &str {
         match self {
             Self::Fix(table) => &table.body,
@@ -31,12 +31,12 @@ struct Owners {
     constraints: BTreeMap<String, usize>,
 }
 
-/// The group that a body goes with.
+/// Index of the group of a body.
 fn group_of<'g>(groups: &'g [(String, Vec<String>)], body: &String) -> Option<&'g (String, Vec<String>)> {
     groups.iter().find(|(_, bodies)| bodies.contains(body))
 }
 
-/// The tables of which something holds.
+/// The tables for which a condition holds.
 fn those<T: Clone>(tables: &[(String, T)], holds: impl Fn(&String, &T) -> bool) -> Vec<(String, T)> {
     tables.iter().filter(|(name, table)| holds(name, table)).cloned().collect()
 }
@@ -101,13 +101,13 @@ impl<'s> Part<'s> {
         has || (self.index == 0 && !is_known)
     }
 
-    /// The laws that its bodies use, or none of the scene.
+    /// The laws that its bodies use. A law that no body of the scene uses goes to the first part.
     fn laws(&self) -> Vec<(String, LawTable)> {
         let is_spare = |law: &String| self.index == 0 && !uses(&self.scene.bodies, law);
         those(&self.scene.laws, |law, _| uses(&self.bodies, law) || is_spare(law))
     }
 
-    /// The outputs of what it has.
+    /// The outputs of its bodies and surfaces.
     fn outputs(&self) -> Vec<(String, OutputTable)> {
         let mut outputs = self.scene.outputs.clone();
         outputs.retain_mut(|(_, output)| match output {
@@ -132,7 +132,7 @@ impl<'s> Part<'s> {
         outputs
     }
 
-    /// The view, as far as it is of what it has.
+    /// The view, reduced to its bodies and fields.
     fn view(&self) -> ViewTable {
         let mut view = self.scene.view.clone();
         let seen = view.on.as_deref().is_none_or(|on| self.owns(on));
@@ -237,7 +237,7 @@ impl Scene {
         groups
     }
 
-    /// Refuses ties of bodies that there are not.
+    /// Reports ties of bodies that do not exist.
     fn check_ties(&self, known: &[&str], out: &mut Vec<Diagnostic>) {
         for (name, table) in &self.ties {
             for (index, body) in table.between.iter().enumerate() {
@@ -251,7 +251,7 @@ impl Scene {
         }
     }
 
-    /// Refuses walls on bodies of other participants: their common nodes have one solver.
+    /// Reports walls on bodies of other participants: their common nodes have one solver.
     fn check_walls(&self, groups: &[(String, Vec<String>)], out: &mut Vec<Diagnostic>) {
         for (name, table) in &self.bodies {
             let Some(host) = &table.on else { continue };

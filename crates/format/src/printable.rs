@@ -43,8 +43,8 @@ pub(crate) fn boundary_after(text: &str, at: usize) -> usize {
     (at..=text.len()).find(|&at| text.is_char_boundary(at)).unwrap_or(text.len())
 }
 
-/// The text without codes that a terminal obeys, and where it is longer than a message should be, its
-/// beginning and how much follows.
+/// Returns the text without codes that a terminal obeys. A text that is too long for a message is cut, with
+/// the number of bytes that follow.
 pub(crate) fn shortened(mut text: String) -> String {
     if let Cow::Owned(visible) = printable(&text) {
         text = visible;

@@ -29,11 +29,11 @@ pub struct Parameter {
     pub description: String,
     /// Name of the definition of its value, or of the items of its value; empty without one.
     pub table: String,
-    /// The parameters of the table, or of each of the tables, that it is.
+    /// The parameters of the table, or of each of the tables, that its value is.
     pub parts: Vec<Parameter>,
 }
 
-/// The page of all tables of a scene, as Markdown. Kinds of values that several tables take, or that hold
+/// The page of all tables of a scene, as Markdown. Kinds of values that several tables take, or that contain
 /// themselves, have a section of their own at the end.
 pub fn page(sections: &[Section]) -> String {
     let mut page = String::from(
@@ -152,7 +152,7 @@ fn python_class(name: &str, section: &Section, doc: &str, parameters: &[Paramete
     if !parameters.is_empty() {
         page.push('\n');
     }
-    // Those without a default come first, as in any signature.
+    // Parameters without a default come first, as in any signature.
     for parameter in
         parameters.iter().filter(|own| own.required).chain(parameters.iter().filter(|own| !own.required))
     {
@@ -213,7 +213,7 @@ fn describe_forms(schemas: Forms<'_>, forms: &[Form<'_>], depth: usize) -> Vec<P
             let of_all = forms.iter().all(|form| form.required.contains(key));
             if parameters.iter().all(|known| known.key != *key) {
                 let mut found = parameter(schemas, key, schema, of_all, depth);
-                // The form says more of the value than its type does.
+                // The form describes the value better than its type does.
                 let said = schema.get("description").is_some();
                 if let Some(doc) = form.doc.filter(|_| !said && own == 1 && !common(key)) {
                     found.description = doc.to_owned();
@@ -273,7 +273,7 @@ fn word(form: &Form<'_>) -> Option<Parameter> {
     })
 }
 
-/// A Markdown table of parameters; those within tables follow theirs as `fibre.cell-data`.
+/// A Markdown table of parameters; parameters within a table follow the table's, as `fibre.cell-data`.
 pub fn markdown(parameters: &[Parameter]) -> String {
     table(parameters, &[])
 }

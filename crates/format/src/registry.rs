@@ -1,5 +1,5 @@
-//! The one place where a `type` of a scene file meets a parameter struct. Laws have their own registry beside
-//! the laws, in `pliant_mechanics::law`.
+//! The one place where a `type` of a scene file meets a parameter struct. Laws have their own registry in
+//! `pliant_mechanics::law`.
 
 use std::collections::BTreeMap;
 
@@ -90,7 +90,7 @@ typed! {
     "csv" => Csv(CsvTable),
 }
 
-/// The word of a table's `type`, if it is one of the known; else a diagnostic.
+/// The word of a table's `type`, if it is known; else a diagnostic.
 fn type_of<'s>(
     source: &'s Source,
     path: &[&str],
@@ -332,8 +332,8 @@ mod tests {
         all::<OutputTable>();
     }
 
-    /// Lines of TOML between backticks in the descriptions of a schema: how many there are, and those that
-    /// the checker refuses.
+    /// Lines of TOML between backticks in the descriptions of a schema: their number, and the lines that the
+    /// checker refuses.
     fn lines_refused(scene: &Json) -> (usize, Vec<String>) {
         /// Visits each schema, with the chain of the schemas around it, the innermost first.
         fn visit<'s>(schema: &'s Json, around: &[&'s Json], seen: &mut dyn FnMut(&[&'s Json])) {

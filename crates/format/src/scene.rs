@@ -1,4 +1,4 @@
-//! A scene as read: its tables as plain data, each checked on its own, with the places they stand at.
+//! A scene as read: its tables as plain data, each checked on its own, with their places in the file.
 //! References between tables and everything that needs a mesh are checked when the model is built.
 
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ use crate::tables::{
     ToolTable, ViewTable,
 };
 
-/// A scene file and what it says.
+/// A scene file and its tables.
 #[derive(Clone, Debug)]
 pub struct Scene {
     /// The text and the places in it.
@@ -34,7 +34,7 @@ pub struct Scene {
     pub bodies: Vec<(String, BodyTable)>,
     /// `[tie.NAME]`
     pub ties: Vec<(String, TieTable)>,
-    /// Bodies that ties to other participants hold.
+    /// Bodies that are tied to other participants.
     pub tied_outside: Vec<String>,
     /// `[surface.NAME]`
     pub surfaces: Vec<(String, SurfaceTable)>,
@@ -54,7 +54,7 @@ pub struct Scene {
     pub outputs: Vec<(String, OutputTable)>,
     /// `[view]`
     pub view: ViewTable,
-    /// Doubts about values by themselves.
+    /// Warnings about single values.
     pub doubts: Vec<Diagnostic>,
     /// Name of the participant's table that the run comes from, in the scene of one participant.
     pub own: Option<String>,
@@ -135,7 +135,7 @@ impl Scene {
     /// Reads a scene from its text; file names in it are relative to `folder`.
     ///
     /// # Errors
-    /// All mistakes of all tables together.
+    /// Reports all mistakes of all tables together.
     pub fn from_source(source: Source, folder: PathBuf) -> Result<Self, SceneErrors> {
         let mut out = Vec::new();
         check_top(&source, &mut out);
@@ -228,7 +228,7 @@ fn check_top(source: &Source, out: &mut Vec<Diagnostic>) {
     }
 }
 
-/// Reads `[scene]`, which no scene can do without.
+/// Reads `[scene]`, which every scene must have.
 fn read_scene_table(source: &Source, out: &mut Vec<Diagnostic>) -> Option<SceneTable> {
     if source.node(&["scene"]).is_none() {
         let help = "add `[scene]` with `until = 1.0`, the simulated time in seconds";
@@ -273,13 +273,14 @@ fn read_all<T>(
     all
 }
 
-/// Tables in the order of their names: the order of what touches in the file changes no digit.
+/// Sorts tables by their names, so that the order of bodies and contacts in the file changes no digit.
 fn by_name<T>(mut tables: Vec<(String, T)>) -> Vec<(String, T)> {
     tables.sort_by(|(a, _), (b, _)| a.cmp(b));
     tables
 }
 
-/// Files and columns are called after names: whether this is a plain word; a diagnostic if not.
+/// Checks that a name is a plain word, since files and columns are called after names; adds a diagnostic if
+/// not.
 fn check_name(of: &str, name: &str, node: &Node, out: &mut Vec<Diagnostic>) -> bool {
     let plain = !name.is_empty() && name.chars().all(|c| c.is_alphanumeric() || c == '-' || c == '_');
     if !plain {

@@ -110,7 +110,7 @@ impl From<String> for Value {
 }
 
 impl Node {
-    /// A value of the command line.
+    /// Makes a value of the command line.
     fn of_command_line(value: Value) -> Self {
         let value = match value {
             Value::Table(entries) => Value::Table(
@@ -341,9 +341,9 @@ impl Source {
         }
     }
 
-    /// Replaces a value of the file by one of the command line; missing tables on the way are made.
-    ///
-    /// Diagnostics about it say that it was given on the command line. The error says why the path cannot be.
+    /// Replaces a value of the file by one of the command line; missing tables on the path are made.
+    /// Diagnostics about the value say that it was given on the command line. The error says why the path is
+    /// impossible.
     pub fn set(&mut self, path: &[&str], value: impl Into<Value>) -> Result<(), Box<Diagnostic>> {
         let steps: Vec<_> = path.iter().map(|key| ((*key).to_owned(), Place::CommandLine)).collect();
         self.put(&steps, Node::of_command_line(value.into()))
@@ -352,10 +352,10 @@ impl Source {
     /// Takes an assignment in TOML, as `--set "law.liver.shear-modulus = 2e3"` gives it; a single word on the
     /// right needs no quotes. An item of an array has its index, counted from 0, as its key.
     ///
-    /// Diagnostics about it, here and later, underline it.
+    /// Diagnostics about the value, here and later, underline the assignment.
     ///
     /// # Errors
-    /// If it is no assignment, was made before, or its path cannot be.
+    /// If it is no assignment, was made before, or has an impossible path.
     pub fn assign(&mut self, assignment: &str) -> Result<(), Box<Diagnostic>> {
         let text: Arc<str> = format!("{SET}{assignment}").into();
         let (path, node) = parse_assignment(assignment, &text)?;
@@ -392,7 +392,7 @@ impl Source {
         &self.assignments
     }
 
-    /// Puts a value at a path of keys, each with its place; tables on the way are made where missing.
+    /// Puts a value at a path of keys, each with its place; missing tables on the path are made.
     fn put(&mut self, path: &[(String, Place)], value: Node) -> Result<(), Box<Diagnostic>> {
         let mut node = &mut self.root;
         for (depth, (key, place)) in path.iter().enumerate() {

@@ -45,8 +45,8 @@ const LARGE: [&[u8]; 3] = [
 /// Lengths, counts and flags lie among the first and the last bytes, before and after long lists of numbers.
 const ENDS: usize = 200;
 
-/// Returns bytes with a few changes. They are made by [`Random::damaged`] anywhere or near an end, or are a
-/// rare number in place of eight bytes, or a large count in place of one.
+/// Returns bytes with a few changes. [`Random::damaged`] makes them anywhere or near an end. Or a rare number
+/// takes the place of eight bytes, or a large count the place of one.
 pub fn forged(random: &mut Random, bytes: &[u8]) -> Vec<u8> {
     let far = bytes.len().saturating_sub(ENDS);
     let mut changed = bytes.to_vec();

@@ -1,4 +1,4 @@
-//! The scene that a mesh alone is: soft tissue that is held at one end, to be looked at and pulled.
+//! The scene of a mesh alone: soft tissue that is held at one end, to be viewed and pulled.
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ use pliant_geometry::{Labels, Mesh};
 
 /// A body whose longest side is longer than this [m] is taken to be in millimetres.
 const LARGEST: f64 = 2.0;
-/// Cells along the longest side of what a surface encloses.
+/// Cells along the longest side of the volume inside a surface.
 const CELLS: f64 = 12.0;
 /// Young's modulus [Pa], Poisson's ratio and density [kg/m³].
 const TISSUE: [f64; 3] = [5e3, 0.45, 1000.0];
@@ -111,7 +111,7 @@ pub(super) fn calming(young: f64, density: f64, length: f64) -> f64 {
     0.5 * std::f64::consts::PI * (young / density).sqrt() / length.max(1e-6)
 }
 
-/// To two digits.
+/// Rounds to two digits.
 fn rounded(value: f64) -> f64 {
     format!("{value:.1e}").parse().unwrap_or(value)
 }

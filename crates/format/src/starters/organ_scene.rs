@@ -26,13 +26,14 @@ pub struct OrganScene {
     pub vessels: Vec<(String, f64)>,
     /// Thickness of the capsule [m].
     pub capsule: Option<f64>,
-    /// Corners of the box round the bulk of the tissue [m].
+    /// Corners of the box around the bulk of the tissue [m].
     pub bounds: [Vector3; 2],
 }
 
 impl OrganScene {
-    /// Its text, commented. The organ is held at its lowest tenth along its longest side and pulled at the
-    /// other end. Damping is half of the critical one of the slowest vibration along that side.
+    /// Text of the scene, with comments. The organ is held at its lowest tenth along its longest side and
+    /// pulled at the other end. Damping is half of the critical damping of the slowest vibration along that
+    /// side.
     ///
     /// ```
     /// use pliant_geometry::Vector3;
@@ -112,7 +113,7 @@ impl OrganScene {
     }
 }
 
-/// To three digits.
+/// Rounds to three digits.
 fn rounded(value: f64) -> f64 {
     format!("{value:.2e}").parse().unwrap_or(value)
 }

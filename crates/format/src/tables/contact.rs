@@ -298,10 +298,10 @@ pub struct ContactTable {
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub friction: f64,
-    /// Distance [m] that the surfaces keep. If not given with the solver `explicit`, 0 from a rigid thing,
-    /// and 0.5 % of the mean edge between bodies or of a body with itself. If not given with the solvers
-    /// `implicit` and `static`, half of the thickness of each shell that takes part. Nodes of explicit bodies
-    /// that are nearer at the start keep their distance.
+    /// Distance [m] that the surfaces keep. If not given with the solver `explicit`, 0.5 % of the mean edge
+    /// for bodies and self-contact, and 0 from a rigid thing. If not given with the solvers `implicit` and
+    /// `static`, half of the thickness of each shell that takes part. Nodes of explicit bodies that are
+    /// nearer at the start keep their distance.
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub thickness: Option<f64>,
