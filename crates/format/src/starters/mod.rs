@@ -1,5 +1,5 @@
-//! Scenes to start from: the small, commented scene that `pliant new` writes, a scene of a mesh, and a scene
-//! of an organ with vessels and capsule.
+//! Scenes to start from: the small, commented scene of `pliant new`, a scene of a mesh, and a scene of an
+//! organ with vessels and capsule.
 
 mod of_mesh;
 mod organ_scene;

@@ -9,9 +9,9 @@ use serde::Deserialize;
 use super::body::{CleanTable, Label};
 use super::load::{RotateTable, Timing};
 
-/// A rigid thing that bodies touch: an obstacle such as a bone, or a tool. It stands where `at` and `turn`
-/// put it, and moves by one of `by`, `rotate` and `poses`, or not at all. Curve: `smooth-step` if not given.
-/// What touches it is named by `[contact.NAME]`.
+/// A rigid thing that bodies touch: an obstacle such as a bone, or a tool. `at` and `turn` set its pose; it
+/// moves by one of `by`, `rotate` and `poses`, or not at all. Curve: `smooth-step` if not given.
+/// `[contact.NAME]` names the bodies that touch it.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct ToolTable {
@@ -34,12 +34,12 @@ pub struct ToolTable {
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub ideal_grip: Option<f64>,
-    /// The force [N] that it pushes with at most. From half of it on it gives way, and lags behind its
-    /// trajectory; when nothing is in its way any more, it catches up.
+    /// Largest force [N] with which it pushes. From half of this force on it gives way, and lags behind its
+    /// trajectory. When the obstacle is gone, it catches up.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub force_limit: Option<f64>,
-    /// By how much it grows over time.
+    /// Growth over time.
     #[serde(default)]
     pub grows: Option<GrowthTable>,
     /// Displacement [m], reached along the curve.
@@ -144,8 +144,8 @@ pub struct ConeTool {
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct RevolvedTool {
     /// Its outline from below upwards: heights, distances from the axis, and radii of the arcs in place of
-    /// corners [m]. All between it and the axis is in it. Beyond an end off the axis the outline goes
-    /// straight on.
+    /// corners [m]. The body is the space between outline and axis. Beyond an end off the axis the outline
+    /// continues straight.
     pub outline: Vec<[f64; 3]>,
 }
 
@@ -276,22 +276,23 @@ impl ImageTool {
     }
 }
 
-/// Who touches whom: a body an obstacle or a tool, another body, or itself. With the solver `explicit`, for
-/// bodies without bending, impulses keep surfaces apart; bodies that touch each other are solids. With the
-/// solvers `implicit` and `static`, for solids and shells, a barrier does. Only barriers exclude
-/// intersections: no state that is accepted has one. The force on the second is in `csv` outputs as
-/// `contact.NAME`.
+/// Contact of a body with an obstacle or a tool, with another body, or with itself. With the solver
+/// `explicit`, for bodies without bending, impulses keep surfaces apart; only solids can touch each other.
+/// With the solvers `implicit` and `static`, for solids and shells, a barrier keeps surfaces apart. Only
+/// barriers exclude intersections: no accepted state has an intersection. `csv` outputs have the force on the
+/// second body as `contact.NAME`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ContactTable {
-    /// The body, and what it touches: `between = ["liver", "probe"]`. The same body twice: itself. `"all"`:
-    /// all solids, obstacles and tools; with the solvers `implicit` and `static` also shells and membranes
-    /// that are not `on` a solid. Each pair has an entry of its own, `contact.NAME.liver-probe`.
+    /// The body, and the thing that it touches: `between = ["liver", "probe"]`. The same body twice means
+    /// self-contact. `"all"`: all solids, obstacles and tools; with the solvers `implicit` and `static` also
+    /// shells and membranes that are not `on` a solid. Each pair has an entry of its own,
+    /// `contact.NAME.liver-probe`.
     pub between: [String; 2],
-    /// The faces of the first that touch; if not given, all of its boundary.
+    /// Faces of the first body that touch; if not given, its whole boundary.
     #[serde(default)]
     pub faces: Option<Selection>,
-    /// The faces of the second, if that is another body; if not given, all of its boundary.
+    /// Faces of the second, if it is another body; if not given, its whole boundary.
     #[serde(default)]
     pub other_faces: Option<Selection>,
     /// Coulomb's coefficient of friction [1].
@@ -320,7 +321,7 @@ pub struct ContactTable {
     #[serde(default)]
     #[schemars(range(max = 2))]
     pub subdivision: Option<u8>,
-    /// Speed [m/s] below which bodies creep that friction should hold, with the solvers `implicit` and
+    /// Largest speed [m/s] at which bodies creep that friction should hold. With the solvers `implicit` and
     /// `static`; 0.001 if not given.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
@@ -338,8 +339,8 @@ pub struct ContactTable {
     #[serde(default)]
     pub separate: bool,
     /// Gap [m] between the shapes at rest, beyond the distance that surfaces keep. Where bodies overlap or
-    /// are nearer, their nodes at rest move apart by the least ways, so that the run starts without stress.
-    /// For organs that touch in one segmentation and are meshed one by one.
+    /// are nearer, their nodes at rest move apart by the smallest displacements, so that the run starts
+    /// without stress. For organs that touch in one segmentation and are meshed one by one.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub gap: Option<f64>,

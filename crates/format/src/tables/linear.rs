@@ -35,7 +35,7 @@ impl LinearWay {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum LinearName {
-    /// Factors of the symmetric stiffness: robust, and unstable equilibria are noticed.
+    /// Factors of the symmetric stiffness: robust, and detects unstable equilibria.
     #[default]
     Direct,
     /// Factors of the stiffness with the unsymmetric part of loads: twice the work, for moments about fixed
@@ -55,7 +55,7 @@ pub struct LinearTable {
     #[serde(default = "thousandth")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub tolerance: f64,
-    /// Iterations of conjugate gradients at the most.
+    /// Most iterations of conjugate gradients.
     #[serde(default = "thousand")]
     #[schemars(range(min = 1, max = 1_000_000))]
     pub iterations: u32,
@@ -94,12 +94,12 @@ fn thousand() -> u32 {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum PreconditionerName {
-    /// The factors of an older stiffness, made anew once they need more than ten iterations.
+    /// The factors of an older stiffness, computed again once they need more than ten iterations.
     LaggedFactors,
     /// The inverse of each node's own block: the least memory.
     BlockJacobi,
-    /// This, and a solution for the rigid motions of groups of neighbouring nodes: far fewer iterations on
-    /// many elements.
+    /// Block Jacobi with a solution for the rigid motions of groups of neighbouring nodes: far fewer
+    /// iterations on many elements.
     #[default]
     Aggregates,
 }
@@ -115,8 +115,8 @@ pub struct ControlTable {
     /// Motion of a node over the whole run, in equal parts.
     #[serde(default)]
     pub displacement: Option<ControlledNode>,
-    /// Length [m] that all displacements together go in a load step, √Σ|Δu|². The path ends where `stop`
-    /// says, or with the last load step.
+    /// Length [m] of the increment of all displacements in a load step, √Σ|Δu|². The path ends at `stop`, or
+    /// with the last load step.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub arc_length: Option<f64>,
@@ -124,7 +124,7 @@ pub struct ControlTable {
     /// load is as written.
     #[serde(default)]
     pub stop: Option<StopTable>,
-    /// Volume [m³] that the pressurised triangles, which must be closed, enclose at the end; it changes in
+    /// Volume [m³] inside the pressurised triangles at the end; they must be closed. The volume changes in
     /// equal parts.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
@@ -142,7 +142,7 @@ pub struct StopTable {
     /// Displacement of a node.
     #[serde(default)]
     pub displacement: Option<ControlledNode>,
-    /// Number of limit points passed, where the load turns round.
+    /// Number of limit points passed, where the load turns back.
     #[serde(default)]
     #[schemars(range(min = 1))]
     pub limit_points: Option<u32>,

@@ -32,7 +32,7 @@ pub enum CurveShape {
     Ramp,
     /// 3s² − 2s³: starts and ends without a jolt.
     SmoothStep,
-    /// 10s³ − 15s⁴ + 6s⁵: smoother still.
+    /// 10s³ − 15s⁴ + 6s⁵: even smoother.
     #[serde(rename = "polynomial-10-15-6")]
     Polynomial,
     /// The full value from the start.
@@ -74,9 +74,10 @@ pub struct FixTable {
     pub components: Option<Vec<Axis>>,
 }
 
-/// Nodes whose mean displacement is prescribed, each of them free by itself: a face under a plate that tilts.
-/// Weighted by the area of the boundary at each node where the nodes have whole faces, else equally. Its
-/// reaction is the force of the plate. With every solver on the CPU but explicit shells.
+/// Nodes whose mean displacement is prescribed, while each node is free: a face under a plate that tilts. If
+/// the nodes have whole faces, the mean is weighted by the area of the boundary at each node; otherwise all
+/// nodes count equally. The reaction is the force of the plate. With every solver on the CPU except explicit
+/// shells.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct MeanTable {
@@ -86,7 +87,7 @@ pub struct MeanTable {
     pub nodes: Selection,
     /// Mean displacement [m], reached along the curve.
     pub by: [f64; 3],
-    /// Components of it that are prescribed; if not given, all three.
+    /// Components that are prescribed; if not given, all three.
     #[serde(default)]
     pub components: Option<Vec<Axis>>,
     /// Its curve over time.
@@ -118,11 +119,11 @@ pub struct VolumeTable {
     /// of a cavity.
     #[serde(default)]
     pub faces: Option<Selection>,
-    /// By how much the enclosed volume grows from that at rest [m³], along the curve; 0 keeps it, less than 0
-    /// empties it.
+    /// Growth of the enclosed volume from rest [m³], along the curve; 0 keeps the volume, less than 0 empties
+    /// it.
     pub by: f64,
-    /// The pressure [Pa] that it takes at most, of suction likewise. There the volume lags behind its curve;
-    /// when less is needed, it catches up. With the solvers `implicit` and `static`.
+    /// Largest pressure or suction [Pa]. At this pressure the volume lags behind its curve; when less is
+    /// needed, it catches up. With the solvers `implicit` and `static`.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub pressure_limit: Option<f64>,
@@ -278,8 +279,8 @@ pub struct MomentTable {
     pub timing: Timing,
 }
 
-/// A force per length on edges of shells, of triangles both of whose ends are selected and which only one
-/// triangle has. Curve: `smooth-step` if not given.
+/// A force per length on edges of shells that only one triangle has and whose ends are both selected. Curve:
+/// `smooth-step` if not given.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct EdgeLoadTable {
@@ -309,7 +310,7 @@ pub struct TractionTable {
     pub timing: Timing,
 }
 
-/// Pressure on faces that follows them as they deform. Curve: `smooth-step` if not given.
+/// Pressure on faces, which follows the faces as they deform. Curve: `smooth-step` if not given.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct PressureTable {

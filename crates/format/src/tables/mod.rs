@@ -48,7 +48,7 @@ pub const MOST_THREADS: u32 = 1024;
 /// Most parts that an edge of a shell is cut into in pictures.
 pub const MOST_CURVED: u32 = 100;
 
-/// Title and duration of the scene.
+/// Title, duration and gravity of the scene.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct SceneTable {
@@ -58,7 +58,8 @@ pub struct SceneTable {
     /// Simulated time [s].
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub until: f64,
-    /// Acceleration of all bodies [m/s²], from the start; for one that grows, use a load of type `gravity`.
+    /// Acceleration of all bodies [m/s²], from the start; for an acceleration that grows, use a load of type
+    /// `gravity`.
     #[serde(default)]
     pub gravity: Option<[f64; 3]>,
 }
@@ -123,8 +124,8 @@ pub struct RunTable {
     /// best: `fast`, and `gather` on adapters that are software.
     #[serde(default)]
     pub design: Option<DesignName>,
-    /// Number type of the solver; if not given, `double` on the CPU and `single` on a GPU, which has
-    /// no other.
+    /// Number type of the solver; if not given, `double` on the CPU and `single` on a GPU, which has only
+    /// this.
     #[serde(default)]
     pub precision: Option<PrecisionName>,
     /// Solver that advances the state in time.
@@ -152,13 +153,13 @@ pub struct RunTable {
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub tolerance: Option<f64>,
-    /// Iterations of Newton's method at the most in a step of `implicit` (20 if not given) or `static` (40).
-    /// With 1 a step of `implicit` is one linear solution, and its residual is not checked: for real time.
+    /// Most iterations of Newton's method in a step of `implicit` (20 if not given) or `static` (40). With 1
+    /// a step of `implicit` is one linear solution, and its residual is not checked: for real time.
     #[serde(default)]
     #[schemars(range(min = 1, max = 10_000))]
     pub iterations: Option<u32>,
-    /// Speed [m/s] of all nodes below which a Newton step of `implicit` in contact is the last one; it is
-    /// still made. If not given, a step must move nothing by more than a thousandth of `barrier-distance`.
+    /// Speed [m/s] of all nodes below which a Newton step of `implicit` in contact is the last one; this step
+    /// is still made. If not given, a step must move no node by more than a thousandth of `barrier-distance`.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub speed_tolerance: Option<f64>,
@@ -176,8 +177,8 @@ pub struct RunTable {
     /// Quantity that a `static` run prescribes instead of the size of a load, so that it passes limit points.
     #[serde(default)]
     pub control: Option<ControlTable>,
-    /// The part of the internal energy that a run may hold in hourglass modes of `hex8` at its end. With more
-    /// it writes all outputs and ends with an error: the shape of the elements is not resolved.
+    /// Part of the internal energy that may be in hourglass modes of `hex8` at the end of a run. With more,
+    /// the run writes all outputs and ends with an error: the shape of the elements is not resolved.
     #[serde(default = "tenth")]
     #[schemars(range(min = 0.0))]
     pub allow_hourglass: f64,
@@ -198,7 +199,7 @@ fn tenth() -> f64 {
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct CheckpointTable {
-    /// Simulated time between them [s]; there is one at the end, too.
+    /// Simulated time between checkpoints [s]; the last one is at the end.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub every: f64,
 }
@@ -209,11 +210,11 @@ pub struct CheckpointTable {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum MassScalingTable {
-    /// Critical time step [s] of the assembled model at rest that is reached at least, with little more mass
-    /// than it needs. The automatic `step` is 0.9 × as long.
+    /// Least critical time step [s] of the assembled model at rest, reached with little more mass than it
+    /// needs. The automatic `step` is 0.9 × as long.
     TargetStep(#[schemars(extend("exclusiveMinimum" = 0.0))] f64),
-    /// The most mass that is added, as a part of the mass of the materials: 0.01 is 1 %. The critical time
-    /// step becomes as long as it allows.
+    /// Most mass that is added, as a part of the mass of the materials: 0.01 is 1 %. The critical time step
+    /// becomes as long as this mass allows.
     Share(#[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0))] f64),
 }
 
@@ -223,7 +224,7 @@ pub enum MassScalingTable {
 pub enum LoadSteps {
     /// Number of equal load steps.
     Count(#[schemars(range(min = 1, max = 1_000_000))] u32),
-    /// Unequal ones.
+    /// Unequal load steps.
     Times(LoadTimes),
 }
 
@@ -242,7 +243,7 @@ impl Default for LoadSteps {
 }
 
 impl LoadSteps {
-    /// The first one of a scene of a duration [s].
+    /// End of the first load step [s] of a scene of a duration [s].
     pub fn first(&self, until: f64) -> f64 {
         match self {
             Self::Count(count) => until / f64::from(*count),
@@ -304,7 +305,8 @@ pub enum DeviceName {
     Cpu,
     /// A GPU.
     Gpu,
-    /// A GPU where there is one and it can run the scene, else the CPU; the run says which and why.
+    /// A GPU where there is one and it can run the scene, else the CPU; the run reports its choice and the
+    /// reason.
     Auto,
 }
 

@@ -17,9 +17,9 @@ pub enum FieldName {
     Velocity,
     /// Rotation vector [rad] of the nodes of shells, of length at most π.
     Rotation,
-    /// Force [N] by which constraints hold or move a node; zero where it is free.
+    /// Force [N] by which constraints hold or move a node; zero for free nodes.
     Reaction,
-    /// Moment [N m] by which constraints hold or turn a node of a shell about itself; zero where it is free.
+    /// Moment [N m] by which constraints hold or turn a node of a shell about itself; zero for free nodes.
     ReactionMoment,
     /// Deformation gradient F of a solid, a membrane or a bar, as the mean over the element. The thickness of
     /// membranes and bars stays constant in F. Nine numbers xx, xy, xz, yx, …, zz: xy is the change of x
@@ -50,8 +50,8 @@ pub enum FieldName {
     /// Strain energy of the instantaneous elastic law per volume at rest [J/m³], with the element's averages
     /// of volume. Summed over the elements, times their volumes, it is the stored energy.
     EnergyDensity,
-    /// The longest stable step [s] of the element alone, of its stiffness at the instant; of shells that
-    /// at rest, which turns with them. The smallest one bounds the step of the whole.
+    /// Critical time step [s] of the element alone, from its current stiffness; for shells from the stiffness
+    /// at rest, which turns with them. The smallest value bounds the step of the whole model.
     ElementStep,
     /// Force per length in the wall of a shell or a membrane [N/m], as a tensor in space.
     MembraneForce,
@@ -80,8 +80,8 @@ pub enum FieldName {
     AxialStretch,
     /// Force along a bar [N], positive where it pulls.
     AxialForce,
-    /// The larger size of the principal strains of a shell at its top and bottom; small-strain elasticity
-    /// holds to about 0.1.
+    /// Largest size of the principal strains of a shell at its top and bottom. Small-strain elasticity is
+    /// valid to about 0.1.
     SurfaceStrain,
     /// Sum of the forces [N] of contacts on a node.
     ContactForce,
@@ -189,12 +189,12 @@ impl FieldName {
         }
     }
 
-    /// The field of a name, as it stands in scenes and files.
+    /// Returns the field of a name in scenes and files.
     pub fn of_name(name: &str) -> Option<Self> {
         serde_json::from_value(name.into()).ok()
     }
 
-    /// Its unit; empty for none.
+    /// Its unit; empty without one.
     pub fn unit(self) -> &'static str {
         match self {
             Self::Displacement | Self::Thickness | Self::CurrentThickness | Self::Gap | Self::Slip => "m",
@@ -322,7 +322,7 @@ impl FieldName {
         moved || self.is_of_contact() || self.is_of_marks()
     }
 
-    /// True for fields of what holds, moves and loads nodes.
+    /// True for fields of constraints and loads.
     pub(crate) fn is_of_marks(self) -> bool {
         matches!(self, Self::Constraint | Self::Load | Self::Weight)
     }
@@ -332,7 +332,7 @@ impl FieldName {
         matches!(self, Self::ContactForce | Self::ContactPressure | Self::Gap | Self::Slip)
     }
 
-    /// True for fields that surfaces on solids carry: those that say something between the nodes.
+    /// True for fields that surfaces on solids carry: they have values between the nodes.
     pub fn is_of_surface(self) -> bool {
         let of_nodes = matches!(self, Self::Rotation | Self::Reaction | Self::ReactionMoment);
         !of_nodes && !self.is_of_contact() && !self.is_of_marks()

@@ -1,4 +1,4 @@
-//! Participants: bodies that one stepper advances together, apart from the others of the scene.
+//! Participants: bodies that one stepper advances together, apart from the other bodies of the scene.
 
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -10,8 +10,8 @@ use super::{
 
 /// Bodies with a solver and a step of their own. Bodies that no participant names follow `[run]`: with the
 /// solvers `implicit` and `static` all together, else the solids together and the shells together.
-/// Participants advance at their own steps and meet at common instants, where outputs see them. A key that is
-/// left out is as in `[run]`.
+/// Participants advance at their own steps and meet at common instants, where outputs are written. A key that
+/// is left out has the value of `[run]`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ParticipantTable {
@@ -72,7 +72,7 @@ pub struct ParticipantTable {
 }
 
 impl ParticipantTable {
-    /// `[run]` with the keys that are given here in place of its own.
+    /// Returns `[run]` with its keys replaced by the keys that are given here.
     pub(crate) fn over(&self, run: &RunTable) -> RunTable {
         let run = run.clone();
         RunTable {

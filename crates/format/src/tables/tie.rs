@@ -21,7 +21,7 @@ pub struct TieTable {
     /// The nodes of the first body that follow; if not given, all inside or on the second.
     #[serde(default)]
     pub nodes: Option<Selection>,
-    /// Largest distance of such a node from the second body [m]; if not given, a tenth of its median edge.
+    /// Largest distance of a tied node from the second body [m]; if not given, a tenth of its median edge.
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub tolerance: Option<f64>,
@@ -34,10 +34,10 @@ pub struct TieTable {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum TieMethod {
-    /// Weighted means over the common area of faces of two solids, so that a constant stress passes in either
-    /// order.
+    /// Weighted means over the common area of faces of two solids, so that a constant stress is transmitted
+    /// in either order of the bodies.
     Mortar,
-    /// Each node follows the element of the other body in which it lies, or on whose surface.
+    /// Each node follows the element of the other body that holds it, or on whose surface it lies.
     Points,
 }
 

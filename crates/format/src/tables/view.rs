@@ -51,8 +51,8 @@ pub struct ViewTable {
     #[serde(default)]
     pub colour: Option<ColourBy>,
     /// Parts to hide, so that parts inside or behind are seen, as `[2, "tumour", "5-8", "grasper"]`. Labels
-    /// of elements are given by number, name or range, and bodies, obstacles and tools by name. If a label
-    /// and a body have the same name, the label is hidden.
+    /// of elements are given by number, name or range, and bodies, obstacles and tools by name. A name that a
+    /// label and a body share means the label.
     #[serde(default)]
     pub hide: Vec<CellLabel>,
     /// Parts that look different from the rest, by names as in `hide`:
@@ -65,7 +65,7 @@ pub struct ViewTable {
     /// a tensor needs one.
     #[serde(default)]
     pub component: Option<Component>,
-    /// The map of colours; all but `turbo` are even to eyes that see no red or green.
+    /// The map of colours; all but `turbo` look even to eyes that see no red or green.
     #[serde(default)]
     pub map: MapName,
     /// Values of the first and the last colour, in SI units; if not given, from the values of all frames
@@ -134,7 +134,7 @@ pub struct ViewTable {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct LookTable {
-    /// From 0, invisible, to 1, opaque: a body of 0.3 shows what lies inside.
+    /// Opacity from 0, invisible, to 1, opaque: a body of 0.3 shows its inside.
     #[serde(default = "one")]
     #[schemars(range(min = 0.0, max = 1.0))]
     pub opacity: f64,
@@ -246,7 +246,7 @@ impl Component {
         }
     }
 
-    /// Numbers of the values that have it: 3 of vectors, 9 of tensors.
+    /// Number of components of the values that have it: 3 for vectors, 9 for tensors.
     pub fn of(self) -> usize {
         if self.word().len() == 1 { 3 } else { 9 }
     }
@@ -319,7 +319,7 @@ pub struct CameraTable {
     #[serde(default = "elevation")]
     #[schemars(range(min = -90.0, max = 90.0))]
     pub elevation: f64,
-    /// Magnification of what fits the picture.
+    /// Magnification; at 1 everything fits the picture.
     #[serde(default = "one")]
     #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 1000.0))]
     pub zoom: f64,
@@ -401,13 +401,13 @@ impl ViewTable {
         matches!(self.colour, Some(ColourBy::Labels(_)))
     }
 
-    /// The regions that it hides of those there are. Others are left out: a scene that asks for them is
-    /// refused when it is built.
+    /// The existing regions that it hides. Other names are left out: a scene with them is refused when it is
+    /// built.
     pub fn hidden(&self, names: &RegionNames) -> Vec<Region> {
         self.hide.iter().filter_map(|name| names.find(name).ok()).flatten().collect()
     }
 
-    /// The regions with a look of their own, of those there are.
+    /// The existing regions with a look of their own.
     pub fn looks(&self, names: &RegionNames) -> Vec<(Region, LookTable)> {
         let regions = |name: &String| names.find(&CellLabel::Name(name.clone())).unwrap_or_default();
         let of = |(name, look): (&String, &LookTable)| {

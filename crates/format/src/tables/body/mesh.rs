@@ -19,7 +19,7 @@ use super::{
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct MeshTable {
     /// A mesh file, relative to the scene: Gmsh (.msh), VTK (.vtk, .vtu), OBJ, OFF, STL, PLY, GIfTI,
-    /// FreeSurfer. Its own cells are taken, unless `as` asks for others made of its surface.
+    /// FreeSurfer. Its own cells are used, unless `as` asks for new cells from its surface.
     #[serde(default)]
     pub file: Option<PathBuf>,
     /// Name of a mesh in the memory of the program that reads the scene, instead of a `file`. Not available
@@ -31,8 +31,8 @@ pub struct MeshTable {
     /// to the front, z to the head [m].
     #[serde(default)]
     pub image: Option<PathBuf>,
-    /// Another image of the same voxels whose values are added before the `threshold`, as grey matter to
-    /// white matter.
+    /// Another image of the same voxels; its values are added before the `threshold`, as grey matter to white
+    /// matter.
     #[serde(default)]
     pub add: Option<PathBuf>,
     /// Several masks of the same voxels as one image; each mask is an image with 0 outside. The first mask
@@ -56,14 +56,14 @@ pub struct MeshTable {
     pub labels: Option<Vec<Label>>,
     /// Labels of vessels in the organ of `label` or `labels`, by number, name or range. Vessel voxels inside
     /// the organ belong to the organ, with the label of the tissue around them. Vessel voxels outside do not.
-    /// A voxel is inside if more than half of the 26 ways from it lead through vessels into the organ.
+    /// A voxel is inside if more than half of the 26 directions from it lead through vessels into the organ.
     #[serde(default)]
     pub vessels: Option<Vec<Label>>,
     /// Instead of labels: all voxels of at least this value, as of a map of probabilities. Their label is 1.
     #[serde(default)]
     pub threshold: Option<f64>,
-    /// Cleaning of the labels of an image, or of what the surface of a file encloses, before new cells are
-    /// made.
+    /// Cleaning of the labels of an image, or of the volume inside the surface of a file, before new cells
+    /// are made.
     #[serde(default)]
     pub clean: Option<CleanTable>,
     /// A box from the origin.
@@ -108,13 +108,13 @@ pub struct MeshTable {
     /// have a point in common; with `edge` each piece is cut into bars of about that length.
     #[serde(default)]
     pub lines: Option<Vec<Vec<[f64; 3]>>>,
-    /// Target edge length of the cells of a built-in shape, an image or what the surface of a file encloses
-    /// [m].
+    /// Target edge length [m] of the cells of a built-in shape, an image or the volume inside the surface of
+    /// a file.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub edge: Option<f64>,
     /// Longer edge of tets inside, away from the surface [m], rounded down to 2, 4, 8, ... times `edge`. For
-    /// tets of an image, or of the volume that the surface of a file encloses.
+    /// tets of an image, or of the volume inside the surface of a file.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub inner_edge: Option<f64>,
@@ -122,13 +122,13 @@ pub struct MeshTable {
     /// `["tumour", { label = 5, edge = 0.002 }]`. Edges are rounded down to a half, a quarter, ... of `edge`.
     #[serde(default)]
     pub protect: Option<Vec<Protected>>,
-    /// Largest distance between the boundary of tets and the body [m], both ways: they are made smaller where
-    /// it is not held. It is measured to the triangles of a file, or to the smooth surface of an image.
-    /// Without `edge` the first edge is chosen.
+    /// Largest distance between the boundary of tets and the body [m], both ways. Tets are made smaller where
+    /// they exceed it. The distance is measured to the triangles of a file, or to the smooth surface of an
+    /// image. Without `edge` the first edge is chosen automatically.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub distance: Option<f64>,
-    /// Number of triangles of a `surface` of an image or a file, instead of `edge`: as few, placed where the
+    /// Number of triangles of a `surface` of an image or a file, instead of `edge`. They are placed where the
     /// shape needs them.
     #[serde(default)]
     #[schemars(range(min = 4))]

@@ -48,8 +48,8 @@ pub struct BodyTable {
     /// strain; a shell whose `layers` all have their own elasticity needs none.
     #[serde(default = "no_law")]
     pub law: ByLabel<String>,
-    /// Mass per volume [kg/m³], or one for each cell label, as of `law`. Elements with averaged pressure
-    /// average it apart on parts of different density.
+    /// Mass per volume [kg/m³], or one for each cell label, as for `law`. Elements with averaged pressure
+    /// average it separately on parts of different density.
     pub density: ByLabel<Density>,
     /// Thickness of a shell or a membrane [m]: one, or one for each triangle.
     #[serde(default)]
@@ -58,8 +58,8 @@ pub struct BodyTable {
     /// of a `thickness`. Their angles count from `fibre`, projected on each triangle.
     #[serde(default)]
     pub layers: Vec<LayerTable>,
-    /// Tension [N/m] of a shell in the shape of its mesh, equal in all directions: what holds a flat
-    /// `membrane` across. Not for the element `plate`.
+    /// Tension [N/m] of a shell in the shape of its mesh, equal in all directions: it holds a flat `membrane`
+    /// across its plane. Not for the element `plate`.
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub pre_tension: f64,
@@ -84,8 +84,8 @@ pub struct BodyTable {
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub area: Option<f64>,
-    /// Length of bars without force over that in the mesh: above 1 they hang through at the start, below 1
-    /// they pull.
+    /// Length of bars without force over their length in the mesh: above 1 they are slack at the start, below
+    /// 1 they pull.
     #[serde(default = "one")]
     #[schemars(range(min = 0.1, max = 10.0))]
     pub slack: f64,
@@ -207,7 +207,7 @@ impl BodyModel {
 pub enum Normals {
     /// The point data `normal` of its mesh, as `pliant mesh --as shells` writes them.
     Mesh,
-    /// The mean of the triangles round each node.
+    /// The mean of the triangles around each node.
     Triangles,
 }
 
@@ -343,8 +343,8 @@ pub enum Element {
     Tet4,
     /// Linear tetrahedron with average nodal pressure (Bonet and Burton 1998): the recommended tetrahedron.
     Tet4Anp,
-    /// Linear tetrahedron with improved average nodal pressure, variational: softer still; watch for pressure
-    /// modes.
+    /// Linear tetrahedron with improved average nodal pressure, in variational form. Even softer; watch for
+    /// pressure modes.
     Tet4Ianp,
     /// Linear tetrahedron with improved average nodal pressure as in NiftySim; not the gradient of an energy.
     Tet4IanpNiftysim,
@@ -355,20 +355,20 @@ pub enum Element {
     /// energy of the volume alone.
     Hex8Full,
     /// Shell: discrete Kirchhoff triangle and the mean membrane strain of the curved triangle: the
-    /// recommended one.
+    /// recommended shell.
     DktCurved,
     /// Shell: discrete Kirchhoff triangle and optimal flat ANDES membrane, whose drilling adapts to the
-    /// thickness. `dkt-curved` is this on flat walls; on curved walls under pressure this one scatters
-    /// displacements from node to node.
+    /// thickness. On flat walls it is the same as `dkt-curved`. On curved walls under pressure its
+    /// displacements scatter from node to node.
     DktOpt,
-    /// Shell: discrete Kirchhoff triangle and constant-strain membrane, too stiff for bending in its plane,
-    /// and calm under pressures that stretch thin curved walls much.
+    /// Shell: discrete Kirchhoff triangle and constant-strain membrane, too stiff for bending in its plane.
+    /// Stable under pressures that stretch thin curved walls much.
     DktCst,
     /// Shell without bending, in small strain: a constant-strain membrane whose nodes do not turn. In large
     /// strain take `model = "membrane"`.
     Membrane,
-    /// Shell without membrane: bending and twist of plates, for studies; something else must hold it in its
-    /// plane.
+    /// Shell without membrane: bending and twist of plates, for studies. Other constraints must hold it in
+    /// its plane.
     Plate,
     /// Shell: the element of Comas (2010), corrected for its typing errors. Only for comparison: it depends
     /// on the numbering of the corners and converges to plates 6 to 26 % too soft.

@@ -67,7 +67,7 @@ pub enum PatternName {
     Antidiagonal,
     /// Two triangles, diagonals mirrored from cell to cell.
     UnionJack,
-    /// Four triangles round the middle.
+    /// Four triangles around the middle.
     Crossed,
 }
 
@@ -104,7 +104,7 @@ pub struct CylinderShape {
     pub grid: SheetGrid,
 }
 
-/// A sphere: an icosahedron whose triangles are cut into four again and again.
+/// A sphere: an icosahedron whose triangles are repeatedly cut into four.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct SphereShape {
@@ -181,7 +181,7 @@ pub struct LensShape {
     /// Diameter of the optic [m].
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub optic: f64,
-    /// Diameter of the circle around all of it [m].
+    /// Diameter of the circle around the whole lens [m].
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub overall: f64,
     /// Width of a haptic [m].
@@ -190,7 +190,7 @@ pub struct LensShape {
     /// Angle over which a haptic leaves the optic [degrees].
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 180.0))]
     pub transition: f64,
-    /// Angle over which a haptic goes in all [degrees].
+    /// Whole angle of a haptic [degrees].
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 180.0))]
     pub sweep: f64,
 }
