@@ -1,4 +1,4 @@
-//! Inputs that no program has written: bytes changed where it hurts, and what became of each.
+//! Forged inputs: bytes with harmful changes, and the result of each.
 //!
 //! ```
 //! use pliant_testing::Random;
@@ -84,13 +84,13 @@ pub struct Attempts {
     pub taken: u64,
     /// See [`taken`](Self::taken).
     pub refused: u64,
-    /// The longest that one took, and its seed.
+    /// Longest time of an input, and its seed.
     pub longest: (Duration, u64),
-    /// Panics: message and place, how often, the first seed and where that was called from.
+    /// Panics: message and place, number, first seed and its caller.
     pub panics: BTreeMap<String, (u64, u64, String)>,
 }
 
-/// The last panic, with where it was called from.
+/// The last panic, with its caller.
 static LAST: Mutex<Option<(String, String)>> = Mutex::new(None);
 
 impl Attempts {
@@ -121,7 +121,7 @@ impl Attempts {
         let done = panic::catch_unwind(AssertUnwindSafe(go));
         panic::set_hook(before);
         done.unwrap_or_else(|other| {
-            // One that no attempt has caught is a fault of the test.
+            // A panic that no attempt has caught is a fault of the test.
             if let Some((message, from)) = LAST.lock().ok().and_then(|mut last| last.take()) {
                 eprintln!("{message}\n{from}");
             }

@@ -75,7 +75,7 @@ pub fn ball_of_hexes(radius: f64, cells: i32, layers: i32) -> Hexes {
     grown_hexes(cells, layers, SIZE, [true; 3], |x| {
         let largest = x.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
         let length = x.iter().map(|x| x * x).sum::<f64>().sqrt();
-        // From a cube, that bulges, to a sphere.
+        // The shape goes from a bulging cube to a sphere.
         let round = 0.4 + 0.6 * (largest - 1.0).max(0.0) / (SIZE - 1.0);
         let scale = if largest > 0.0 { (1.0 - round) * 0.8 + round * largest / length } else { 1.0 };
         x.map(|x| x * scale * radius / SIZE)

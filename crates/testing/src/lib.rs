@@ -65,7 +65,7 @@ impl Random {
         [0; 3].map(|_| self.number())
     }
 
-    /// A whole number from 0 to below `limit`; 0 where that is 0.
+    /// A whole number from 0 to below `limit`; 0 if `limit` is 0.
     pub fn below(&mut self, limit: usize) -> usize {
         (self.next() >> 33) as usize % limit.max(1)
     }

@@ -80,7 +80,7 @@ pub fn longest_edge(mesh: &Mesh) -> f64 {
     tets(mesh).flat_map(of_tet).fold(0.0, f64::max)
 }
 
-/// Points of a boundary whose faces there are more than one fan.
+/// Points of a boundary at which the faces form more than one fan.
 pub fn pinched(faces: &[Vec<u32>]) -> Vec<u32> {
     let mut others: BTreeMap<u32, Vec<[u32; 2]>> = BTreeMap::new();
     for face in faces {
@@ -148,7 +148,7 @@ pub fn conforming_boundary(mesh: &Mesh) -> Vec<Vec<u32>> {
     let opposite = |face: &Vec<u32>| rotated(face.iter().rev().copied().collect());
     let boundary: Vec<_> =
         faces.keys().filter(|face| !faces.contains_key(&opposite(face))).cloned().collect();
-    // A face of three nodes that appears in two orders of its nodes would have been seen from one side twice.
+    // If three nodes appear in two orders, one side of the face occurs twice.
     let mut sorted: Vec<_> = boundary.iter().map(|face| sorted(face)).collect();
     sorted.sort();
     assert!(sorted.windows(2).all(|pair| pair[0] != pair[1]), "faces that do not meet");

@@ -1,5 +1,4 @@
-//! Label images of the analytic organs as their definition gives them, and the truth to measure meshes
-//! against.
+//! Label images of the analytic organs by their definition, and the true surfaces to measure meshes against.
 
 use pliant_geometry::{CellKind, Grid, Mesh, SurfaceLocator, Vector3, boundary};
 use pliant_imaging::LabelImage;

@@ -2,7 +2,7 @@
 //! ones of Erleben (2018, TOG 37:39).
 //!
 //! A body is a block of tets whose upper side may be narrowed to a tip or an edge. Bodies that are held stand
-//! for rigid ones: a solver may put shapes of the same size in their place.
+//! for rigid bodies: a solver may replace them by rigid shapes of the same size.
 
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -15,7 +15,7 @@ pub const SIZE: f64 = 0.02;
 const SHARP: f64 = 0.04;
 /// Distance [m] between bodies at the start.
 const GAP: f64 = 3e-3;
-/// Velocity [m/s] of what falls.
+/// Velocity [m/s] of falling bodies.
 const FALLS: [f64; 3] = [0.0, 0.0, -0.1];
 
 /// A block whose upper side is narrowed.
@@ -154,7 +154,7 @@ pub struct Scene {
     pub has_floor: bool,
 }
 
-/// Plays each scene with soft bodies, and again with rigid ones in place of those that are held, if any is
+/// Plays each scene with soft bodies, and again with rigid bodies in place of the held ones, if any are held
 /// (`true`).
 ///
 /// # Panics
@@ -238,7 +238,7 @@ pub fn stacks() -> Vec<Scene> {
     ]
 }
 
-/// The ten of Erleben: spikes, wedges, holes, cracks and cliffs.
+/// The ten scenes of Erleben: spikes, wedges, holes, cracks and cliffs.
 pub fn erleben() -> Vec<Scene> {
     let scene = |name, pieces| Scene { name, pieces, gravity: 9.81, has_floor: false };
     // Blocks beside a crack or a square hole of a third of their size.

@@ -1,6 +1,6 @@
-//! Scenes of tests: texts and mesh files to start from, a temporary folder for them, and what a check or a
-//! run of one finds. All of it happens in this process and in the words of the libraries, so only the tests
-//! of the binary itself need the binary.
+//! Scenes of tests: texts and mesh files to start from, a temporary folder for them, and the results of
+//! checks and runs. Everything happens in this process by calls of the libraries, so only the tests of the
+//! binary itself need the binary.
 
 mod said;
 mod texts;
@@ -64,8 +64,8 @@ pub fn run_world(world: &World, folder: &Path) -> Summary {
     summary
 }
 
-/// Asserts that an error, as it is shown and as running text, has these words. The object of the run calls it
-/// one of input.
+/// Asserts that an error has these words, as shown and as running text, and that the object of the run calls
+/// it an input error.
 #[track_caller]
 pub fn assert_input_error([err, words]: [&str; 2], json: &Value, says: &[&str]) {
     for piece in says {
@@ -155,7 +155,7 @@ pub fn looks_change_nothing(world: &World) {
                 looked.stop_on(&stop);
             }
             assert_eq!(seen(&mut looked), first, "at t = {} s", looked.time());
-            // Only steps that take long are stopped within, and not taken then.
+            // Only long steps are interrupted; an interrupted step is not taken.
             stop.ask();
             let stopped = looked.step(1);
             stop.clear();
@@ -165,7 +165,7 @@ pub fn looks_change_nothing(world: &World) {
         }
         looked.step(1).unwrap();
     }
-    // Forces at the end bring back what lies on a device.
+    // Reading the forces at the end copies the state back from a device.
     let prints = [&mut looked, &mut whole].map(|simulation| {
         simulation.frame().unwrap();
         simulation.fingerprint()
@@ -173,7 +173,7 @@ pub fn looks_change_nothing(world: &World) {
     assert_eq!(prints[0], prints[1]);
 }
 
-/// Runs a world without a stop, and after a shorter one from its checkpoint on: that checkpoint, and the
+/// Runs a world without a stop, and from the checkpoint of a shorter run. Returns the checkpoint and the
 /// table of each.
 pub fn taken_up(whole: &World, half: &World, place: &Path) -> (Checkpoint, [String; 2]) {
     for (world, name) in [(whole, "whole"), (half, "half")] {
@@ -259,7 +259,7 @@ impl Workshop {
         (header, rows)
     }
 
-    /// The cells of a CSV file row by row; commas in quotes separate none.
+    /// The cells of a CSV file row by row; commas in quotes do not separate cells.
     pub fn cells(&self, name: &str) -> Vec<Vec<String>> {
         let cells = |line: &str| {
             let (mut all, mut quoted) = (vec![String::new()], false);
@@ -362,8 +362,8 @@ impl Workshop {
         Sweep::new(self.source()?, self.case.clone(), &set)
     }
 
-    /// Runs the scene for all combinations of some values of keys, as `pliant sweep` does; what an earlier
-    /// sweep left there is removed.
+    /// Runs the scene for all combinations of some values of keys, as `pliant sweep` does; files of an
+    /// earlier sweep there are removed.
     #[track_caller]
     pub fn sweep(&self, out: &str, set: &[&str], options: SweepOptions<'_>) -> SweepSummary {
         let sweep = self.combinations(set).unwrap_or_else(|errors| panic!("{}", errors.plain()));
@@ -385,7 +385,7 @@ impl Workshop {
         self.relative(output)
     }
 
-    /// The result of a run as an object, or the message of why there is no run.
+    /// The result of a run as an object, or the message with the reason why there is no run.
     fn attempt(
         &self,
         checkpoint: Option<&str>,
@@ -461,7 +461,7 @@ pub struct Told {
     pub err: String,
     /// The lines of the scene, and the options, in which something is underlined.
     underlined: Vec<String>,
-    /// The object that `pliant run --json` prints; none of a check without mistakes.
+    /// The object that `pliant run --json` prints; null for a check without mistakes.
     result: Value,
 }
 

@@ -28,7 +28,7 @@ fn main() {
 const WARM_UP: Duration = Duration::from_millis(300);
 const MEASURED: Duration = Duration::from_secs(4);
 
-/// Calls and prints a line.
+/// Measures the calls and prints a line.
 fn measure(name: &str, mut call: impl FnMut() -> f64) {
     let start = Instant::now();
     while start.elapsed() < WARM_UP {
@@ -96,7 +96,8 @@ impl Ball {
     }
 }
 
-/// Boxes of all triangles found anew, and the triangles near a capsule with the distance of their nodes (P1).
+/// Computes the boxes of all triangles, and finds the triangles near a capsule with the distances of their
+/// nodes (P1).
 fn refit_and_tool() -> impl FnMut() -> f64 {
     let mut ball = Ball::new();
     let around = |points: &[Vector3], face: [u32; 3]| Bounds::of(face.map(|node| points[node as usize]));
@@ -144,7 +145,7 @@ fn folded() -> Ball {
         let phase = std::f64::consts::TAU * pass as f64 / PASSES as f64;
         let place = |k: u32| {
             let [i, j] = [k % (columns + 1), k / (columns + 1)].map(f64::from);
-            // The upper half goes back over the lower one, half a cell beside its nodes.
+            // The upper half lies over the lower half, shifted by half a cell.
             let beyond = i - 0.5 * f64::from(columns);
             let x = if beyond > 0.0 { 0.5 * f64::from(columns) - beyond + 0.5 } else { i };
             let lift = if beyond > 0.0 { 2e-4 } else { 0.0 };
@@ -155,7 +156,7 @@ fn folded() -> Ball {
     Ball { faces, passes: (0..PASSES).map(swung).collect(), pass: 0 }
 }
 
-/// A surface against itself, by lists of candidates that hold, or that are made anew in each pass.
+/// Self-contact of a surface, by candidate lists that stay valid, or that are computed again in each pass.
 fn with_itself(mut surface: Ball, anew: bool) -> impl FnMut() -> f64 {
     let mut pairs = Pairs::new(&surface.surface(), None, 0.0, |node| surface.passes[0][node as usize]);
     move || {

@@ -86,9 +86,9 @@ pub enum LawKind {
     NeoHookean,
     /// Transversely isotropic, liver-like.
     Fibres,
-    /// The first, half of its isochoric stress relaxing (one Prony term).
+    /// `NeoHookean`, with half of its isochoric stress relaxing (one Prony term).
     NeoHookeanProny,
-    /// The second, likewise.
+    /// `Fibres`, with half of its isochoric stress relaxing.
     FibresProny,
 }
 

@@ -26,7 +26,8 @@
 //! | a node's step | 79 | per component 24, of which 12 are energies; 7 once |
 //!
 //! The cofactors belong to C − I. The root is J^(−1/3) by steps of third order, 9 operations each: 18 in
-//! single, 27 in double precision. Hourglass control changes V P, and tests for corners that may be inverted.
+//! single, 27 in double precision. Hourglass control changes V P (72), and tests for corners that may be
+//! inverted (5).
 //!
 //! `tet4-anp` computes J in a separate pass and averages it (6 + 4 per cell, 1 per node); `hex8-full`
 //! computes J and the stress at eight points, where f_a = Σ w P B_a takes 18 (N−1) per point.
@@ -59,7 +60,7 @@ struct OfElement {
     indices: f64,
     /// Numbers read and written per node.
     node_numbers: f64,
-    /// Operations per cell except those at the points.
+    /// Operations per cell except at the points.
     flops: f64,
     /// Operations per point except the cube root and the isochoric stress.
     point_flops: f64,

@@ -86,7 +86,7 @@ pub(crate) struct Measured {
 }
 
 impl Row {
-    /// From the wall times of a step [s] and the step [s] with the limit it is taken from.
+    /// Makes a row from the wall times of a step [s], and the step [s] with the source of its limit.
     pub(crate) fn new(
         case: Case,
         place: Measured,
@@ -164,11 +164,11 @@ impl Fit {
         fits
     }
 
-    /// `None` of fewer than three meshes.
+    /// Fits a series; `None` for fewer than three meshes.
     fn of(rows: &[&Row]) -> Option<Self> {
         let (first, last) =
             (rows.iter().min_by_key(|row| row.cells)?, rows.iter().max_by_key(|row| row.cells)?);
-        // Of r = N/T, b = Σ r / Σ r².
+        // With r = N/T, b = Σ r / Σ r².
         let rates = rows.iter().map(|row| 1.0 / row.ns_per_element_step);
         let b = rates.clone().sum::<f64>() / rates.map(|r| r * r).sum::<f64>();
         let deviation = |row: &Row| (row.ns_per_element_step / b - 1.0).abs();
@@ -269,7 +269,7 @@ pub struct Report {
     pub device: Option<OnDevice>,
     /// The cases.
     pub rows: Vec<Row>,
-    /// Cases that were too large for it.
+    /// Cases that were too large for the GPU.
     pub refused: Vec<Refused>,
     /// Linear cost of the series.
     pub fits: Vec<Fit>,

@@ -80,7 +80,7 @@ pub struct ShellRun {
     pub shells: usize,
     /// Wall times of a step [s].
     pub time: Times,
-    /// Wall time of all its parts, in all steps.
+    /// Wall times of the parts of all steps.
     pub phases: Phases,
     /// Steps.
     pub steps: usize,
@@ -119,7 +119,7 @@ impl ShellRun {
         Ok(Self { shells: model.facets.len(), time, phases, steps, residual, last: state })
     }
 
-    /// Mean [ms] of a step of a time of all.
+    /// Mean time per step [ms], from the time of all steps.
     fn mean(&self, all: Duration) -> f64 {
         1e3 * all.as_secs_f64() / self.steps as f64
     }
@@ -141,8 +141,8 @@ fn real_time(preconditioner: Preconditioner) -> DynamicSettings {
     DynamicSettings::new(SHELL_STEP).real_time(linear)
 }
 
-/// Measures tubes of 800 to 50,000 shells, on a GPU, too, where there is one; on one that is software up to
-/// 4,000.
+/// Measures tubes of 800 to 50,000 shells, also on a GPU if there is one. On a software GPU it measures up to
+/// 4,000 shells.
 ///
 /// # Errors
 /// If the GPU or a step fails.

@@ -118,8 +118,8 @@ fn largest_in_real_time(fit: &Fit, rows: &[Row]) -> Option<Case> {
         && matches!(fit.case.law, LawKind::NeoHookean | LawKind::FibresProny)
         && fit.case.precision == Precision::Single
         && fit.case.place != Place::Processor(Threads::One);
-    // From the finest mesh with a known critical time step of the assembled model; otherwise from
-    // the finest mesh.
+    // Extrapolates from the finest mesh with a known critical time step of the assembled model, else from the
+    // finest mesh.
     let known = rows.iter().filter(|row| fit.covers(&row.case));
     let finest = known.max_by_key(|row| (row.critical_step_from == Limit::True, row.cells))?;
     let d = finest.critical_step * finest.case.edge as f64;
@@ -232,13 +232,13 @@ impl Bench {
     }
 }
 
-/// With `x-min` fixed and `x-max` displaced by [`SQUEEZE`].
+/// Fixes `x-min` and displaces `x-max` by [`SQUEEZE`].
 fn squeezed(specimen: Specimen) -> Specimen {
     let hold = Curve { shape: Shape::Hold, from: 0.0, to: 1.0 };
     specimen.fix("x-min", [true; 3]).carry("x-max", SQUEEZE, hold)
 }
 
-/// Every cell deformed equally.
+/// State in which every cell is deformed equally.
 fn start<R: Scalar>(model: &Model) -> State<R> {
     let displacement = model.rest.iter().map(|x| SQUEEZE.map(|by| R::of(by * x[0] / EDGE))).collect();
     State { displacement, ..State::at_rest(model) }

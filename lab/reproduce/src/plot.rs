@@ -37,7 +37,7 @@ pub(crate) enum Pen {
 /// A curve. Curves of one colour belong together.
 #[derive(Clone, Debug)]
 pub(crate) struct Curve {
-    /// Its name in the key; one without a name is not in it.
+    /// Its name in the key; a curve without a name is not in the key.
     pub name: String,
     pub colour: usize,
     pub pen: Pen,
@@ -201,7 +201,7 @@ pub(crate) fn bars(
     Ok(Figure { svg: Some(svg), caption: caption.into() })
 }
 
-/// A number on an axis, without digits that say nothing.
+/// A number on an axis, without superfluous digits.
 fn label(value: &f64) -> String {
     if *value == 0.0 {
         return "0".into();

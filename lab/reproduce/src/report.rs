@@ -17,7 +17,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// Computes cases one after another. `starting` hears of each before it is computed.
+    /// Computes cases one after another. `starting` is called with each case before it is computed.
     pub fn new(cases: &[&'static Case], mut starting: impl FnMut(&'static Case)) -> Self {
         let mut done = Vec::new();
         for &case in cases {
@@ -100,7 +100,7 @@ impl Row {
     }
 }
 
-/// Yes, no, or nothing to judge by.
+/// Verdict in words: yes, no, or not judged.
 pub(crate) fn verdict(pass: Option<bool>) -> &'static str {
     match pass {
         Some(true) => "pass",

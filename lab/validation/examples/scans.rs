@@ -1,6 +1,7 @@
-//! Real scans, each by one command and then 1 s of simulation: what the mesh is like, what step it allows,
-//! what a second costs. Prints a table in Markdown and leaves each scene with its results in a folder:
-//! `PLIANT_DATA=… cargo run --release -p pliant-validation --example scans -- FOLDER [NAME …]`.
+//! Real scans, each meshed by one command and simulated for 1 s. Results are the quality of the mesh, its
+//! critical time step, and the cost of a second. Prints a table in Markdown and leaves each scene with its
+//! results in a folder: `PLIANT_DATA=… cargo run --release -p pliant-validation --example scans -- FOLDER
+//! [NAME …]`.
 //!
 //! The body lies on its back, held there over a fifth of its depth, and its weight grows over the second.
 

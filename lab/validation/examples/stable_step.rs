@@ -141,7 +141,7 @@ impl Measured {
         times[times.len() / 2]
     }
 
-    /// Its row of the table, beside the plain way.
+    /// Returns its row of the table, compared with the plain way.
     fn row(&self, organ: &Organ, plain: &Self) -> String {
         let model = &self.world.participants[0].built.model;
         let heavier = model.mass_scaling.as_ref().map_or(0, |scaling| scaling.nodes());

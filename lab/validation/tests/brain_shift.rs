@@ -5,7 +5,7 @@ use pliant_geometry::{Mesh, Vector3, boundary, io};
 use pliant_validation::brain_shift::{ANP, Shifted, mesh, off_on_the_same_mesh, reference_mesh, stuffed};
 use pliant_validation::{Tets, claim};
 
-/// Holds the root mean square and the largest deviation [m] at the 52 points to limits.
+/// Asserts limits of the root mean square and the largest deviation [m] at the 52 points.
 fn check_points(name: &str, mesh: Mesh, [rms_limit, largest_limit]: [f64; 2]) {
     let shifted = Shifted::new(mesh, ANP).unwrap();
     assert_eq!(shifted.at_points().len(), 52);

@@ -26,7 +26,7 @@ use pliant_testing::{Hexes, grown_hexes};
 use pliant_validation::{claim, reference};
 use serde_json::Value;
 
-/// Steps in which the thing moves to the next depth, and in which it then stays.
+/// Steps in which the rigid thing moves to the next depth, and in which it then stays.
 const MOVES: f64 = 600.0;
 const STAYS: f64 = 900.0;
 /// Damping over the step.
@@ -69,7 +69,7 @@ impl Quarter {
         let cells = &model.solids[0].cells;
         let mut mass = vec![0.0; points.len()];
         for cell in 0..cells.len() {
-            // As of cells of 1 mm: a wave takes the same time through each.
+            // The mass as for cells of 1 mm: a wave takes the same time through each cell.
             let part = 1e-6 * 1000.0 * cells.volume(cell).cbrt() / 8.0;
             cells.nodes(cell).iter().for_each(|&node| mass[node as usize] += part);
         }
@@ -131,8 +131,8 @@ struct Pressed {
     change: f64,
 }
 
-/// Moves a shape from a pose along z to each of the depths [m] and lets the body come to rest there.
-/// `near_pole` [m] says up to which x and y pressure is measured.
+/// Moves a shape from a pose along z to each of the depths [m] and lets the body come to rest there. Pressure
+/// is measured at x and y up to `near_pole` [m].
 fn pressed(
     quarter: &Quarter,
     shape: Shape,
@@ -172,7 +172,7 @@ fn pressed(
         |stepper: &CentralDifference<f64>, which: usize| 4.0 * stepper.contact_forces()[which][2].abs();
     let mut all = Vec::new();
     for k in 1..=depths.len() {
-        // A step feels where the thing is at its end, which must be before it moves on.
+        // A step uses the pose at its end, which must be before the thing moves on.
         let until = (k as f64 * (MOVES + STAYS) - 2.0) * step;
         let mut before = 0.0;
         while state.time < until - 0.5 * step {

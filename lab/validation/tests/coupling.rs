@@ -390,8 +390,8 @@ fn tube(layers: &[(Layer, [usize; 2])]) -> Tube {
     Tube { surfaces: [rings[0][0].clone(), rings[last][1].clone()], model }
 }
 
-/// The pressure [Pa] at which the inner surface, moved to a radius [m] as by a balloon, holds, and the radius
-/// of the outer one.
+/// Moves the inner surface to a radius [m], as a balloon does. Returns its pressure [Pa], and the radius of
+/// the outer surface.
 fn inflated(mut tube: Tube, radius: f64) -> [f64; 2] {
     let rest = tube.model.rest.clone();
     let inner = &tube.surfaces[0];
@@ -470,7 +470,7 @@ fn a_segmented_liver_is_pulled_with_and_without_its_capsule() {
         edge: 0.014,
         vessels: vec![(format!("{}, label = 1", mask("fast_portal_vein_and_splenic_vein.nii.gz")), 1e-3)],
         capsule: Some(1e-4),
-        // Of the mask.
+        // Bounds of the mask.
         bounds: [Vector3::new(-0.0655, 0.0848, 0.0928), Vector3::new(0.1355, 0.2708, 0.1828)],
     };
     let pulled = |organ: &pliant_format::OrganScene| {

@@ -59,7 +59,7 @@ impl Hanging {
         solids.flat_map(|solid| (0..solid.cells.len()).map(|cell| solid.cells.volume(cell))).sum()
     }
 
-    /// τ by the critical time step of the body without anything that holds it.
+    /// τ by the critical time step of the free body.
     fn tau(&self) -> f64 {
         let mut free = self.specimen.model.clone();
         free.constraints.clear();

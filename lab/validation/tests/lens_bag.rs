@@ -1,5 +1,5 @@
 //! `scenes/lens/bag.toml`: a lens is folded, pushed through a tube of 2.6 mm and comes into a capsular bag
-//! that deforms. Each state is searched for edges that go through triangles; one would end the run.
+//! that deforms. Each state is searched for edges that go through triangles; such an edge would end the run.
 
 use std::path::Path;
 
@@ -24,7 +24,7 @@ const APART: f64 = 0.28e-3;
 const NEIGHBOURS: f64 = 0.36e-3;
 
 /// The least distance [m] of points and triangles, and of edges, of a mesh of triangles that are no
-/// neighbours at rest. Those farther apart than a millimetre are not looked at.
+/// neighbours at rest. Pairs farther apart than a millimetre are left out.
 struct Layers {
     edges: Vec<[u32; 2]>,
     triangles: Vec<[u32; 3]>,

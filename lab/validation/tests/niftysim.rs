@@ -212,8 +212,8 @@ fn niftysims_main_loop_as_written_down_meets_niftysim() {
     claim("the loop: displacements over the largest", off(&ours, &niftysim_answer("T4_NH")), 2e-5);
 }
 
-/// Every load with every shape acts at the same steps as NiftySim's. What NiftySim does in single precision,
-/// the loop above does in double. Once RAMP and STEP were a step apart: 2e-3.
+/// Every load with every shape acts at the same steps as NiftySim's. The loop above does in double precision
+/// what NiftySim does in single. RAMP and STEP a step apart would give 2e-3.
 #[test]
 fn niftysims_load_shapes_act_at_niftysims_steps() {
     let model = fs::read_to_string(data_file("niftysim/T4_NH.xml")).unwrap();

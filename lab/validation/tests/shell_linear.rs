@@ -13,7 +13,7 @@ use pliant_shells::element::{Bending, Formulation, Membrane};
 use pliant_validation::claim;
 use pliant_validation::shells::{CLAMPED, FLAT, renumbered};
 
-/// Prints a ratio beside the one expected and holds it to that within a tolerance.
+/// Prints a ratio and the expected ratio, and asserts that they agree within a tolerance.
 fn expect(what: &str, ratio: f64, expected: f64, tolerance: f64) {
     println!("{what}: {ratio:.4}, expected {expected:.3}");
     claim(what, (ratio - expected).abs(), tolerance);
@@ -67,7 +67,7 @@ fn clamped_plate_of_distorted_cells() {
     }
 }
 
-/// Numbers of nodes and first corners change nothing but round-off.
+/// The numbering of nodes and the first corners of triangles change only round-off.
 #[test]
 fn numbering_changes_no_deflection() {
     let mesh = plate_mesh(16, Pattern::Diagonal, Some(Distortion { amount: 0.2, seed: 3 }));

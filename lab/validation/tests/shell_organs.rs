@@ -67,8 +67,8 @@ fn refined(mesh: &Mesh) -> Mesh {
     Mesh { points, blocks: vec![CellBlock::new(CellKind::Triangle, nodes)], ..Mesh::default() }
 }
 
-/// The longest edges of slivers, altitude below a twentieth of that edge, turned to the other diagonal where
-/// that is better; how many.
+/// Turns the longest edges of slivers to the other diagonal where this is better. A sliver has an altitude
+/// below a twentieth of that edge. Returns the number of turned edges.
 fn flip_slivers(mesh: &mut Mesh) -> usize {
     let mut cells = triangles(mesh);
     let sides = |[a, b, c]: [u32; 3]| [[a, b], [b, c], [c, a]];
@@ -257,7 +257,7 @@ fn rectum_under_pressure() {
     let Some(data) = data() else { return };
     let mesh = surface(data.join("organs-openhelp/Rectum_Lumen.stl"), 1e-3);
     let organ = Organ { young: 0.5e6, thickness: 3e-3, pressure: 3e3, membrane: FLAT.membrane };
-    // As it is, a pair of slivers of 0.2 mm folds over at 0.8 of the load; half of it is borne.
+    // Without repair, a pair of slivers of 0.2 mm folds over at 0.8 of the load; half of the load is borne.
     let failure = organ.equilibrium(&mesh).unwrap_err();
     assert!(failure.contains("folded over") || failure.contains("folds over"), "{failure}");
     study(&Organ { pressure: 1.5e3, ..organ }, &mesh);
@@ -285,7 +285,7 @@ fn table(path: PathBuf) -> Vec<(f64, f64)> {
 /// Longer than any edge of the leaflets [m].
 const EDGE: f64 = 4e-3;
 
-/// The distance [m] of a node from the nearest facet of another leaflet, if that is below a limit.
+/// The distance [m] of a node from the nearest facet of another leaflet, if it is below a limit.
 fn gap(model: &Assembly, state: &State, leaflet: &[usize], node: usize, limit: f64) -> f64 {
     let mut least = limit;
     let q = state.position[node];
@@ -374,7 +374,7 @@ fn valve(folder: &Path, fine: bool) -> Valve {
 /// Thickness of a leaflet [m].
 const LEAFLET: f64 = 0.4e-3;
 
-/// Until two leaflets are a thickness apart.
+/// Moves the leaflets until two leaflets are a thickness apart.
 #[test]
 #[ignore = "minutes"]
 fn valve_leaflets_close() {
@@ -386,7 +386,7 @@ fn valve_leaflets_close() {
         let mut solver = BackwardEuler::new(model.clone(), DynamicSettings::new(step)).unwrap();
         let mut state = State::at_rest(&model);
         let start = Instant::now();
-        // Where the leaflets hang side by side on the wall they are close from the start.
+        // Leaflets that hang side by side on the wall are close from the start.
         let apart = |n: &usize| gap(&model, &state, &leaflet, *n, 2e-3) >= 2e-3;
         let free: Vec<usize> = (0..leaflet.len()).filter(apart).collect();
         let (mut parts, mut residual) = (0, 0.0_f64);
@@ -472,7 +472,7 @@ fn leak(valve: &Valve, state: &State, apart: f64) -> f64 {
     f64::from(open) / f64::from(all)
 }
 
-/// After the pressure of the deck is highest, 13.03 kPa at 0.305 s [s].
+/// Time [s] after the peak of the deck's pressure, 13.03 kPa at 0.305 s.
 const PEAK: f64 = 0.32;
 
 /// In contact the leaflets close: they lie on each other along their free edges, let nothing through, and

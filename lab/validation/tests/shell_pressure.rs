@@ -42,7 +42,7 @@ fn cylinder(cut: Cut, whole: bool, [round, along]: [usize; 2]) -> Mesh {
         let columns = if whole { round } else { round + 1 };
         let (i, j) = (number % columns, number / columns);
         let [turn, lift] = [(); 2].map(|()| 0.25 * random.number());
-        // Nodes that are held stay where they are.
+        // Held nodes keep their places.
         let free = if whole { j > 0 || 4 * i % round != 0 } else { i > 0 && i < round };
         let angle = step * (i as f64 + if free { turn } else { 0.0 });
         let z = height / along as f64 * (j as f64 + if j > 0 && j < along { lift } else { 0.0 });
@@ -59,7 +59,8 @@ fn cylinder(cut: Cut, whole: bool, [round, along]: [usize; 2]) -> Mesh {
     mesh
 }
 
-/// The cylinder under a pressure that strains it by 1e-6, held as it would stay by itself.
+/// The cylinder under a pressure that strains it by 1e-6, held only against rigid motions and at planes of
+/// symmetry.
 fn pressed(mesh: Mesh, whole: bool, thickness: f64, formulation: Formulation, spread: Spread) -> Specimen {
     let cylinder = Specimen::new(mesh, [1.0, POISSON], thickness, formulation).unwrap();
     let cylinder = if whole {

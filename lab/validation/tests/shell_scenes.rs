@@ -57,7 +57,7 @@ fn table(name: &str, changes: &[&str]) -> Table {
     Table { header, rows }
 }
 
-/// Prints a ratio beside the one expected and holds it to that within a tolerance.
+/// Prints a ratio and the expected ratio, and asserts that they agree within a tolerance.
 #[track_caller]
 fn expect(what: &str, ratio: f64, expected: f64, tolerance: f64) {
     println!("{what}: {ratio:.4}, expected {expected:.3}");
@@ -107,7 +107,7 @@ fn timoshenko_clamped_plate() {
     }
 }
 
-/// Inner nodes moved at random by up to 0.3 of a cell. The probe asks the flat triangle over the middle,
+/// Inner nodes moved at random by up to 0.3 of a cell. The probe reads the flat triangle over the middle,
 /// which lies above the nodes' deflections by up to w″h²/8 (0.002 at N = 32). Seeds 3 and 4 fold a triangle
 /// back (which is warned about), seed 5 makes a sliver of 3 % of its area.
 #[test]

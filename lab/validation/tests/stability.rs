@@ -81,7 +81,7 @@ fn the_limit_of_a_cell_alone_is_exact_on_147_random_states_of_every_kind_of_law(
         for (name, law) in laws() {
             let model = single(cells, law);
             let at_rest = homogeneous(&model, &Tensor::ZERO);
-            // With a limit of the assembly of almost nothing the cell counts alone.
+            // With an almost zero limit of the assembly, only the cell counts.
             let monitor = Monitor::new(&model, 1e-9, OnUnstable::Report);
             let (mut worst, mut least) = (0.0, f64::INFINITY);
             let rest = assembled_at(&model, &at_rest).unwrap().step;
@@ -211,7 +211,7 @@ fn soft_tissue_stretched_by_38_percent_survives_at_0_9_of_the_critical_step_only
         };
         let size = largest(fine.iter().map(|(_, u)| u.abs()));
         let off = largest(course.iter().map(|&(time, u)| (u - at(time)).abs())) / size;
-        // Half of what the step error of the slowest vibrations makes of the phase within their first period.
+        // Half of the phase error of the slowest vibrations within their first period.
         claim(&format!("{cells:?}: the tip's course, off by"), off, 0.01);
     }
 }
@@ -239,7 +239,7 @@ fn below_the_step_a_run_can_stop_or_just_report() {
 #[test]
 fn a_limit_below_a_hundredth_of_the_step_ends_the_run() {
     let block = hanging(soft_tissue(), VolumeCell::Tet, 9.81);
-    // Nobody is asked for the critical time step when a run begins above it.
+    // The critical time step is not computed if a run begins above it.
     let monitor = Monitor::new(&block.model, 1e-7, OnUnstable::Substep);
     let step = 500.0 * block.critical_step();
     let stepper = CentralDifference::new(block.model.clone(), step).unwrap().watched(monitor);
@@ -247,7 +247,7 @@ fn a_limit_below_a_hundredth_of_the_step_ends_the_run() {
     assert!(matches!(ended, Some(StepError::BelowLimit { .. })), "{ended:?}");
 }
 
-/// Relaxing liver, damped, swinging so that its steps are cut and made whole again.
+/// Relaxing liver, damped, swinging so that its steps are cut and restored.
 fn swinging() -> Specimen {
     let parameters = json!({ "shear-modulus": 6568.0, "bulk-modulus": 63_490.0, "exponent": 4.0 });
     let material =
@@ -292,7 +292,7 @@ fn cut_steps_have_the_same_bits_on_any_number_of_threads_and_after_a_restart() {
 
 #[test]
 fn a_free_fall_in_cut_steps_is_exact() {
-    // Nothing holds it: after steps of any lengths x = ½ g t².
+    // The block is free: after steps of any lengths x = ½ g t².
     let block = Specimen::block([0.1; 3], [2; 3], VolumeCell::Hex, &elastic(soft_tissue()), [0.0; 3])
         .falling([0.0, 0.0, -9.81]);
     let limit = block.critical_step();

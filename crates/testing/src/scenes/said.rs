@@ -40,7 +40,7 @@ impl Said {
     /// The object of a run that went well.
     ///
     /// # Panics
-    /// If it did not.
+    /// If it failed.
     #[track_caller]
     pub fn done(&self) -> Value {
         assert_eq!(self.code, 0, "{}", self.err);

@@ -28,7 +28,7 @@ use crate::reference;
 
 /// Half of the length [m].
 const LENGTH: f64 = 10e-3;
-/// Up to here [m] cells are short.
+/// End of the short cells [m].
 const NEAR: f64 = 5e-3;
 /// Radii [m] between deposit and wall, and outside.
 const RADII: [f64; 2] = [1.5e-3, 2e-3];
@@ -104,7 +104,7 @@ fn neo_hookean(young: f64) -> AnyLaw {
 struct Vessel {
     model: Assembly,
     around: u32,
-    /// Layers of the deposit, and of all.
+    /// Numbers of layers of the deposit, and of deposit and wall together.
     layers: [u32; 2],
     along: u32,
 }
@@ -366,7 +366,7 @@ mod tests {
     use super::*;
     use crate::largest;
 
-    /// Off by at most this part: displacements and force.
+    /// Largest relative deviation of displacements and force.
     fn off(divisions: Divisions, young: f64, radii: &[f64]) -> f64 {
         let rows = exact(young);
         let found = widened(divisions, young, radii).unwrap();

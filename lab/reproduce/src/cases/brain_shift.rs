@@ -107,7 +107,7 @@ fn draw_border(mesh: &mut Mesh, normal: &Vector3, height: f64) {
     }
 }
 
-/// 1 of a regular tet, 0 of a flat one, negative of an inverted one.
+/// Quality of a tet: 1 if regular, 0 if flat, negative if inverted.
 fn quality(mesh: &Mesh, tet: &[u32; 4]) -> f64 {
     relative_acoustic_length(CellKind::Tet, &tet.map(|node| mesh.points[node as usize]))
 }

@@ -25,7 +25,7 @@ const REPEATS_ON_DEVICE: usize = 5;
 /// Elements stepped in a repeat.
 const ELEMENT_STEPS: usize = 110_000;
 /// Names of the models, as in the thesis: neo-Hookean elastic, transversely isotropic elastic and
-/// viscoelastic; and neo-Hookean viscoelastic, which it has not.
+/// viscoelastic; and neo-Hookean viscoelastic, which is not in the thesis.
 const MODELS: [&str; 4] = ["NHE", "TIE", "NHV", "TIV"];
 
 /// Figure 6.7.
@@ -62,7 +62,7 @@ fn materials() -> [Material; 4] {
     .map(|(law, prony)| Material { law, prony, density: 1000.0 })
 }
 
-/// Wall times of a step [s] of each model, repeat by repeat, all by steps of the stiffest.
+/// Wall times of a step [s] of each model, repeat by repeat. All take the step of the stiffest model.
 fn measure(cells: usize, device: Option<&Device>) -> Result<Vec<[f64; 4]>, CaseError> {
     let cubes = materials().map(|material| cube(cells, &material));
     let step = cubes.iter().map(|cube| 0.9 * cube.element_bound()).fold(f64::INFINITY, f64::min);

@@ -97,7 +97,7 @@ fn polynomial([x, y]: [f64; 2]) -> [[f64; 9]; 3] {
 struct Deflected {
     corners: [Vector3; 3],
     axes: [Vector3; 3],
-    /// In the axes, from the first corner.
+    /// Corners in the facet's axes, from the first corner.
     local: [[f64; 2]; 3],
     /// (8.4) with the corrected (8.5).
     inverse: SMatrix<f64, 9, 9>,
@@ -361,7 +361,7 @@ impl Ellipsoid {
         (0.5 * (scaled.norm_squared() - 1.0) / scaled.component_div(&self.axes).norm()).abs()
     }
 
-    /// Diagonal of the box round the ellipsoid.
+    /// Diagonal of the box around the ellipsoid.
     fn diagonal(&self) -> f64 {
         2.0 * self.axes.norm()
     }
@@ -429,7 +429,7 @@ fn distances(levels: u32, count: u32, ours: [f64; 2], theirs: f64) -> Result<[Ro
     Ok([most, mean, Row { reference: Some(theirs), ..gap }])
 }
 
-/// The thesis's surface: each facet by itself, as gaps part them.
+/// The thesis's surface: each facet by itself, since gaps separate the facets.
 fn with_gaps(ball: &Ellipsoid, Picture { places, triangles, .. }: &Picture) -> Mesh {
     let (mut points, mut cut) = (Vec::new(), Vec::new());
     for facet in 0..ball.model.facets.len() {
@@ -502,7 +502,8 @@ fn rendering() -> Result<Findings, CaseError> {
     Ok(findings)
 }
 
-/// The area coordinates of a place in a facet that it belongs to; places on edges belong to both.
+/// The area coordinates of a place in a facet, if it belongs to the facet; places on edges belong to both
+/// facets.
 fn weights_in(model: &Assembly, place: &Place, facet: usize) -> Option<[f64; 3]> {
     let (own, nodes) = (model.facets[place.facet as usize].nodes, model.facets[facet].nodes);
     let weighed = own.iter().zip(place.weights).filter(|(_, w)| *w > 0.0);

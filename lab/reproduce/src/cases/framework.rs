@@ -19,7 +19,7 @@ use crate::plot::{Curve, Key, Pen, Plot};
 const CELLS: [usize; 5] = [10, 15, 20, 25, 30];
 /// Repeats of both.
 const REPEATS: usize = 3;
-/// Steps in a repeat: as many as a run takes for each critical time step that it finds anew.
+/// Steps in a repeat: as many as a run takes between computations of the critical time step.
 const STEPS: u64 = 1000;
 
 /// Figure 6.9.
@@ -66,7 +66,7 @@ impl Program {
         Ok(Self([World::new(&scene(cells, until, "")?)?, World::new(&scene(cells, until, SERIES)?)?]))
     }
 
-    /// The liver's, over the first second.
+    /// Program of the liver, over the first second.
     fn of_liver() -> Result<Self, CaseError> {
         let mut scene = super::liver::scene()?;
         scene.scene.until = 1.0;
@@ -89,8 +89,8 @@ impl Program {
         Ok([self.bare()?, whole(&self.0[0])?, whole(&self.0[1])?])
     }
 
-    /// Medians of the repeats' three times [s], and of their costs over the first [%]. A turn before warms
-    /// up.
+    /// Medians of the repeats' three times [s], and of their costs over the first [%]. A turn before the
+    /// repeats warms up.
     fn medians(&self) -> Result<([f64; 3], [f64; 2]), CaseError> {
         self.times()?;
         let times = (0..REPEATS).map(|_| self.times()).collect::<Result<Vec<_>, _>>()?;

@@ -146,14 +146,15 @@ impl Way {
         }
     }
 
-    /// The lens as it is, about its middle.
+    /// Current shape of the lens, about its middle.
     fn shape(&self, frame: &Frame<'_>) -> Mesh {
         let points = self.points(frame);
         let middle = points.iter().sum::<Vector3>() / points.len() as f64;
         Mesh { points: points.into_iter().map(|x| x - middle).collect(), ..self.mesh.clone() }
     }
 
-    /// The least and the largest diameter of the optic over that at rest, between opposite nodes of its rim.
+    /// The least and the largest diameter of the optic over its diameter at rest, between opposite nodes of
+    /// its rim.
     fn diameters(&self, frame: &Frame<'_>) -> [f64; 2] {
         let points = self.points(frame);
         let rest = &self.mesh.points;

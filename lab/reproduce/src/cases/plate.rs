@@ -110,7 +110,7 @@ pub fn deflections(loads: &[f64]) -> Result<Vec<f64>, CaseError> {
     let mut found = Vec::new();
     let at_centre = |frame: &Frame<'_>| frame.parts().map(|(_, now)| now.displacement(centre)[2]).next();
     Simulation::new(World::new(vec![part]))?.run(until, |frame| found.extend(at_centre(frame)))?;
-    // The first instant is that at rest.
+    // The first instant is at rest.
     Ok(found.split_off(1))
 }
 

@@ -42,7 +42,7 @@ const FARTHEST: f64 = 0.5;
 struct Played {
     elements: usize,
     step: f64,
-    /// Wall times of all steps and of all frames [s].
+    /// Wall time of all steps and of all frames [s].
     stepping: f64,
     preparing: f64,
     frames: u64,

@@ -98,7 +98,8 @@ impl Study<'_> {
         rows
     }
 
-    /// A body by a number of shells: its rows, and a picture of the target, the shells and the distances.
+    /// Fits a body by a number of shells: adds its rows, and a picture of the target, the shells and the
+    /// distances.
     fn by_shells(&self, shells: usize, from: [f64; 3], findings: &mut Findings) -> Result<(), CaseError> {
         let start = Instant::now();
         let fitted = FittedShells::new(self.target, ShellGoal::Shells(shells), &|_| {})?;
