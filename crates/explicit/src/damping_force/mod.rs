@@ -16,8 +16,7 @@
 //! Ω² ((1 + η) z² − 2 η z + η). A resolved mode loses ½ η Ω⁴ of its amplitude in a step, so the scheme is
 //! accurate to second order: 2.5e-7 at Ω = 0.1, 0.25 % at Ω = 1, 2.8 % at 0.9 of the critical time step. The
 //! critical time step falls by the factor 1/√(1 + 4 η), 1 %. The moment of the force is of fourth order in
-//! the angle of a step. `docs/lab/performance.md` compares this force with shorter steps and with damping of
-//! first order.
+//! the angle of a step. `docs/lab/performance.md` compares this force with shorter steps.
 //!
 //! *β damps by stiffness*: β ḟ by the difference to the instant before. For any law and element this is β K v
 //! with the tangent K and the velocities half a step ago. A mode of angular frequency ω is damped with the
