@@ -258,7 +258,7 @@ mod tests {
             ("colour = 'von-mises'\ncomponent = 'x'", "leave `component` out"),
             ("colour = 'displacement'\ncomponent = 'xx'", "`x`, `y` or `z`"),
             ("clip = { point = [0, 0, 0], normal = [0, 0, 0] }", "a plane needs a normal"),
-            ("range = [2, 1]", "the range must grow"),
+            ("range = [2, 1]", "the range must increase"),
         ] {
             let message = mistakes(&format!("[view]\n{view}\n")).plain().to_string();
             assert!(message.contains(piece), "{view}: {message}");

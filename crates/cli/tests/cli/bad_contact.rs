@@ -198,7 +198,7 @@ fn states_that_cannot_begin_are_refused_with_their_places() {
     refused(
         &changed(SOLID, "\"implicit\"\nstep = 0.05", "\"static\""),
         &cube(),
-        &["`organ` is free in 6 rigid motions of 6", "this one has node 0"],
+        &["`organ` is free in 6 rigid motions of 6", "including the one with node 0"],
     );
     let air = "[constraint.air]\ntype = \"volume\"\nbody = \"organ\"\nby = 1e-5\n";
     refused(

@@ -277,10 +277,7 @@ mod with_pictures {
             (&["render", "out/case", "--fibres"], "needs `fibre` in `data`"),
             (&["render", "out/case", "--critical"], "needs `element-step` in `data`"),
             (&["render", "out/case", "--contacts"], "needs `contact-force` in `data`"),
-            (
-                &["render", "case", "--contacts"],
-                "no body touches anything, so that there is no `contact-force`",
-            ),
+            (&["render", "case", "--contacts"], "no body touches anything, so there is no `contact-force`"),
             (&["render", "out/case", "--marks"], "needs `constraint` and `load` in `data`"),
             (&["render", "case", "--texture", "wood"], "possible values: none, skin"),
             (&["render", "empty"], "has no series of frames"),

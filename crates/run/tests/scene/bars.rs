@@ -167,5 +167,5 @@ fn what_bars_cannot_be_is_refused_by_name() {
         1,
     );
     let message = world(&fibres).err().unwrap();
-    assert!(message.contains("has directions of its own") && message.contains("is a bar"), "{message}");
+    assert!(message.contains("depends on the direction") && message.contains("is a bar"), "{message}");
 }

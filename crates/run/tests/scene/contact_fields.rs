@@ -106,7 +106,7 @@ fn fields_of_contacts_without_a_contact_are_refused_with_their_line() {
     for (text, pieces) in [
         (
             format!("{alone}{FIELDS}"),
-            ["no body touches anything, so that there is no `contact-force`", "[contact.NAME]"],
+            ["no body touches anything, so there is no `contact-force`", "[contact.NAME]"],
         ),
         (format!("{alone}[view]\ncolour = 'gap'\n"), ["there is no `gap`", "add a contact"]),
         (format!("{alone}[view]\ncontacts = true\n"), ["there is no `contact-force`", "add a contact"]),
@@ -115,7 +115,7 @@ fn fields_of_contacts_without_a_contact_are_refused_with_their_line() {
                 "",
                 &format!("{lonely}[output.other]\ntype = 'vtu'\nevery = 1\non = 'other'\ndata = ['slip']\n"),
             ),
-            ["`other` touches nothing, so that there is no `slip`", "between = [\"other\", …]"],
+            ["`other` touches nothing, so there is no `slip`", "between = [\"other\", …]"],
         ),
         (
             pressed("", &format!("{lonely}[view]\non = 'other'\ncontacts = true\n")),

@@ -249,7 +249,7 @@ fn laws_that_no_wall_can_have_are_refused_by_name() {
                 "type = 'neo-hookean'\nyoung-modulus = 2e5\npoisson-ratio = 0.5",
                 "type = 'transversely-isotropic'\nyoung-modulus = 2e5\npoisson-ratio = 0.5\nfibre-modulus = 1e5\nfibre = [0, 0, 1]",
             ),
-            ["stands across the wall", "another direction"],
+            ["is perpendicular to the wall", "another direction"],
         ),
         (
             coated(EXPLICIT, "hex8", "", CAPSULE).replace("poisson-ratio = 0.45", "poisson-ratio = 0.5"),

@@ -140,7 +140,7 @@ mod tests {
         let notes = build(&scene).unwrap().notes;
         assert_eq!(
             notes,
-            ["law `spare` is used by no body", "`cube` is held by no constraint: and nothing moves it"]
+            ["law `spare` is used by no body", "`cube` is held by no constraint: nothing moves it"]
         );
     }
 }

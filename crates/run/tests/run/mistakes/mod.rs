@@ -274,7 +274,7 @@ fn a_zero_or_not_finite_fibre_of_a_cell_is_told_by_its_number() {
     let line = "fibre = { cell-data = \"fibre\" }";
     for bad in ["0 0 0", "nan 0 1", "inf 0 0"] {
         let mesh = vtk(&CORNERS, &TETS, &fibres(&["0 1 0", "1 0 0", bad, "1 1 0", "0 0 1", bad]));
-        let says = "whose fibre is zero or not finite: tet 2, tet 5 (counted from 0)";
+        let says = "whose data is zero or not finite: tet 2, tet 5 (counted from 0)";
         assert_refused(&with_mesh(mesh, &fibre_scene()), &[line], &[says]);
     }
     let mesh = vtk(&CORNERS, &TETS, &fibres(&["0 1 0"; 6]).replace("fibre", "fiber"));
@@ -287,7 +287,7 @@ fn a_zero_or_not_finite_fibre_of_a_cell_is_told_by_its_number() {
     assert_refused(
         &with_mesh(mesh, &fibre_scene()),
         &[line],
-        &["`fibre` has 1 component, a direction has 3"],
+        &["`fibre` has 1 component, but a direction has 3"],
     );
 }
 
@@ -413,7 +413,7 @@ fn unknown_names_get_the_nearest_one() {
     spoilt(
         "{ on = \"block\"",
         "{ on = \"skin\", data = [\"von-mises\"]",
-        &["`von-mises` belongs to cells, and a probe on a surface has none", "probe the body"],
+        &["`von-mises` is a field of cells, and a surface has only points", "probe the body"],
     );
 }
 
@@ -561,7 +561,7 @@ fn a_motion_from_point_data_needs_an_array_of_finite_vectors() {
     assert_refused(
         &of(&format!("SCALARS shift double 1\nLOOKUP_TABLE default\n{}", numbers(8))),
         &[line],
-        &["point data `shift` has 1 component, a vector has 3", "name an array of vectors"],
+        &["point data `shift` has 1 component, but a vector has 3", "name an array of vectors"],
     );
     assert_refused(
         &of(&format!("VECTORS shift double\n0 0 0 0 nan 0 {}", numbers(18))),
@@ -587,7 +587,7 @@ fn a_table_of_motions_is_refused_with_its_line() {
     refused(None, &["motion.csv` cannot be read", "relative to the scene file"]);
     refused(
         Some("node,x,y,z\n0,0,0\n"),
-        &["motion.csv:2: a row has 4 columns, this one 3", "each row is `node,x,y,z`"],
+        &["motion.csv:2: a row has 4 columns, but this one has 3", "each row is `node,x,y,z`"],
     );
     refused(Some("0,0,inf,0\n"), &["motion.csv:1: `inf` is not a finite number"]);
     refused(Some("8,0,0,0\n"), &["motion.csv:1: there is no node 8: the mesh has 8 nodes", "subtract 1"]);

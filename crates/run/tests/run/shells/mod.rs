@@ -194,7 +194,10 @@ fn doubtful_shells_are_warned_about() {
     let distorted = PLATE.replace("[4, 2]", "[32, 32], distortion = 0.3, seed = 3");
     let output = wall(&[(PLATE, &distorted)]).check(&[]);
     assert_eq!(output.status(), "checked", "{}", output.err);
-    says(&output, &["of `wall` folded back onto all neighbours, as inverted ones are", "smooth or remesh"]);
+    says(
+        &output,
+        &["of `wall` folded back onto all neighbours, like inverted triangles", "smooth or remesh"],
+    );
     let output = wall(&[(THICK, "thickness = 0.002\nelement = \"comas-2010\"")]).check(&[]);
     assert_eq!(output.status(), "checked", "{}", output.err);
     says(&output, &["`wall` has the element of Comas (2010)", "6 to 26 % too soft", "take `dkt-curved`"]);

@@ -28,7 +28,12 @@ impl Context<'_> {
             let place = [path, &["lines", &index]].concat();
             if given.len() < 2 || given.iter().flatten().any(|x| !x.is_finite()) {
                 let help = "a path is a list of points in metres: `[[0, 0, 0], [0, 0, 0.02]]`";
-                self.error(&place, "a path needs two points at least, all of them finite", "this path", help);
+                self.error(
+                    &place,
+                    "a path needs at least two points with finite coordinates",
+                    "this path",
+                    help,
+                );
                 return None;
             }
             let mut node = |point: Vector3| match points.iter().position(|known| *known == point) {

@@ -105,7 +105,7 @@ impl Context<'_> {
         };
         if draft.table.model != BodyModel::Solid && matches!(given, Fibre::PerCell(FibreRule::Laplace { .. }))
         {
-            let message = "a rule by Laplace's equation needs a solid";
+            let message = "the rule `laplace` needs a solid";
             self.error(&path, message, "not for thin walls", "take another rule, or cell data of the mesh");
             return None;
         }
@@ -121,14 +121,18 @@ impl Context<'_> {
                 if without.is_empty() {
                     return Some(directions.into_iter().flatten().collect());
                 }
-                let message = format!("cells of `{name}` {}: {}", lost.cells, list_cells(&without));
+                let message = format!(
+                    "no fibre direction in cells of `{name}` {}: {}",
+                    lost.cells,
+                    list_cells(&without)
+                );
                 fault(&[], message, lost.help)
             }
             Err(fault) => fault,
         };
         let place = self.source().span(&[&path, fault.at.as_slice()].concat());
         let diagnostic =
-            Diagnostic::error(fault.message).at(place, "no direction from this").help(fault.help);
+            Diagnostic::error(fault.message).at(place, "no direction in some cells").help(fault.help);
         // The same rule may serve several laws and kinds of cells: say it once.
         if !self.out.contains(&diagnostic) {
             self.out.push(diagnostic);
@@ -154,8 +158,8 @@ fn directions(
         FibreRule::Toward(point) => {
             let to = |cell| unit(Vector3::from(*point) - centre(cell), LOST * size);
             let lost = Lost {
-                cells: "whose centre is the point that their fibre is to look toward",
-                help: "move the point off the centres of cells, for example outside of the body",
+                cells: "whose centre is the point of `toward`",
+                help: "move the point off the centres of cells, for example out of the body",
             };
             Ok((cells.iter().map(to).collect(), lost))
         }
@@ -168,7 +172,7 @@ fn directions(
                 unit(Vector3::from(ring) * around + axis * along, ZERO)
             };
             let lost = Lost {
-                cells: "whose centre lies on the axis that their fibre is to turn around",
+                cells: "whose centre lies on the axis of `around`",
                 help: "move the axis off the centres of cells, or give these cells a law of their own",
             };
             Ok((cells.iter().map(direction).collect(), lost))
@@ -189,7 +193,7 @@ fn directions(
             };
             let lost = Lost {
                 cells: "where `closest-to` is perpendicular to the surface",
-                help: "choose another direction, or a surface that does not look along it",
+                help: "choose another direction, or a surface that is not perpendicular to it",
             };
             Ok((cells.iter().map(along_surface).collect(), lost))
         }
@@ -204,7 +208,7 @@ fn along(direction: &[f64; 3], count: usize, at: &[&'static str]) -> Result<Dire
 }
 
 fn axis_of(direction: &[f64; 3], what: &str, at: &[&'static str]) -> Result<Vector3, RuleFault> {
-    let help = "a direction, for example [0, 1, 0]; its length does not matter";
+    let help = "give a direction, for example [0, 1, 0]; its length does not matter";
     unit(Vector3::from(*direction), ZERO)
         .map(Vector3::from)
         .ok_or_else(|| fault(at, format!("{what} is zero"), help))
@@ -223,12 +227,12 @@ fn cell_data(
     };
     if data.components != 3 {
         let has = counted(data.components, "component");
-        let message = format!("cell data `{field}` has {has}, a direction has 3");
+        let message = format!("cell data `{field}` has {has}, but a direction has 3");
         return Err(fault(&[], message, "name an array of vectors"));
     }
     let of = |&cell: &u32| unit(Vector3::from_column_slice(data.item(cell as usize)), ZERO);
     let lost = Lost {
-        cells: "whose fibre is zero or not finite",
+        cells: "whose data is zero or not finite",
         help: "give every cell a direction in the mesh file",
     };
     Ok((cells.iter().map(of).collect(), lost))
@@ -249,7 +253,7 @@ fn laplace(
     let (from, to) = (nodes_of(0)?, nodes_of(1)?);
     if let Some(node) = to.iter().find(|node| from.binary_search(node).is_ok()) {
         let message = format!("node {node} (counted from 0) is in `from` and in `to`");
-        return Err(fault(&["laplace"], message, "the two must not meet"));
+        return Err(fault(&["laplace"], message, "choose `from` and `to` without common nodes"));
     }
     let given: Vec<(u32, f64)> =
         from.iter().map(|&node| (node, 0.0)).chain(to.iter().map(|&node| (node, 1.0))).collect();
@@ -264,16 +268,16 @@ fn laplace(
         .map_or(Vec::new(), |b| (0..b.len()).map(|c| nodes(b, c as u32, |node| node)).collect());
     let phi = Laplacian::new(&points, &tets, &hexes)
         .solve(&given)
-        .map_err(|error| fault(&["laplace"], error.to_string(), "are there very flat cells in the mesh?"))?;
+        .map_err(|error| fault(&["laplace"], error.to_string(), "check the mesh for very flat cells"))?;
     let gradients: Vec<Vector3> = cells
         .iter()
         .map(|&cell| Laplacian::mean_gradient(&points, block.cell(cell as usize), &phi).into())
         .collect();
     let steepest = gradients.iter().map(Vector3::norm).fold(0.0, f64::max);
     let lost = Lost {
-        cells: "in which Laplace's field between `from` and `to` is flat",
-        help: "cells whose nodes are all in one of the two, or that neither reaches: select faces of the surface only, \
-               on both sides of every part of the body",
+        cells: "where the solution of Laplace's equation is constant",
+        help: "no cell may have all its nodes in `from` or in `to`, or lie apart from both: select faces of the surface only, on \
+               both sides of every part of the body",
     };
     let of = |gradient: &Vector3| unit(*gradient, (LOST * steepest).max(f64::MIN_POSITIVE));
     Ok((gradients.iter().map(of).collect(), lost))

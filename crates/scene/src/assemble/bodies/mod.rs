@@ -139,8 +139,7 @@ impl Meshed<'_> {
         let path = ["body", name, "mesh"];
         if self.source().node(&path).is_none() {
             let message = format!("missing key `mesh` in `body.{name}`");
-            let help =
-                "`mesh`: a file, a shape or an image; or for a wall `on`, the body on whose boundary it is";
+            let help = "add `mesh` (a file, a shape or an image), or for a wall `on` (the body whose boundary it covers)";
             self.error(&path[..2], message, "`mesh` is missing here", help);
             return None;
         }
@@ -177,7 +176,7 @@ impl Meshed<'_> {
         if table.layers.is_empty() {
             if table.law.values().is_empty() {
                 let message = format!("missing key `law` in `body.{name}`");
-                let help = "`law`: the name of a table `[law.NAME]`, or one for each label";
+                let help = "add `law = \"NAME\"` for a table `[law.NAME]`, or one law for each label";
                 self.error(&["body", name], message, "`law` is missing here", help);
                 return;
             }
@@ -189,7 +188,7 @@ impl Meshed<'_> {
         }
         if table.model == BodyModel::Shell {
             if table.fraction.is_some() {
-                let message = format!("`{name}` is a shell, whose cells are all full");
+                let message = format!("`fraction` is for solids, and `{name}` is a shell");
                 let help = "leave it out, or set `model = \"solid\"`";
                 self.error(&["body", name, "fraction"], message, "has no effect", help);
             }
@@ -323,7 +322,7 @@ impl Meshed<'_> {
                 let help = format!(
                     "give one {key} for the whole body, or use a mesh whose cell data `label` numbers its regions"
                 );
-                self.error(&path, message, "by label", help);
+                self.error(&path, message, "given by label", help);
                 return;
             };
             for label in &labels.values {
@@ -339,8 +338,8 @@ impl Meshed<'_> {
         }));
         if !missing.is_empty() {
             let message = format!("cells of `{name}` have labels without {key}: {missing}");
-            let help = format!("add `LABEL = {example}` for each of them");
-            self.error(&path, message, "not for these", help);
+            let help = format!("add `LABEL = {example}` for each label");
+            self.error(&path, message, "labels are missing", help);
         }
         let known = Labels::of(mesh).all_shown().join(", ");
         for label in map.keys().filter(|label| !counts.contains_key(*label)) {
@@ -408,7 +407,7 @@ impl Meshed<'_> {
             return;
         }
         let message = format!(
-            "law `{law_name}` has a Poisson's ratio of {poisson:.2}: it gets wider when it is pulled, as no soft tissue does"
+            "law `{law_name}` has a Poisson's ratio of {poisson:.2}: it gets wider when it is pulled, unlike soft tissue"
         );
         if self.out.iter().all(|known| known.message != message) {
             let help = "take a `bulk-modulus` above two thirds of the `shear-modulus`, or a `poisson-ratio` from 0 to 0.5";
@@ -475,7 +474,7 @@ impl Meshed<'_> {
             let unused = match families {
                 0 if law.extras.fibre.is_some() => Some("has no fibres: its `fibre` has no effect"),
                 0 | 1 if law.extras.second_fibre.is_some() => {
-                    Some("has not two families of fibres: its `second-fibre` has no effect")
+                    Some("has fewer than two families of fibres: its `second-fibre` has no effect")
                 }
                 _ => None,
             };

@@ -67,7 +67,7 @@ fn point_data<'m>(name: &str, body: &str, mesh: &'m Mesh) -> Result<&'m DataArra
 fn of_data(name: &str, data: &DataArray, nodes: &[u32]) -> Result<Vec<[f64; 3]>, VectorFault> {
     if data.components != 3 {
         let message =
-            format!("point data `{name}` has {}, a vector has 3", counted(data.components, "component"));
+            format!("point data `{name}` has {}, but a vector has 3", counted(data.components, "component"));
         return Err(fault(message, "name an array of vectors; pad plane vectors with zeros"));
     }
     let vector = |&node: &u32| {
@@ -106,9 +106,10 @@ fn read_rows(
         let wrong = |what: String| fault(format!("{shown}:{line}: {what}, found `{row}`"), FORM);
         let [node, components @ ..] = columns.as_slice() else { continue };
         let Ok(components) = <[&str; 3]>::try_from(components) else {
-            return Err(wrong(format!("a row has 4 columns, this one {}", columns.len())));
+            return Err(wrong(format!("a row has 4 columns, but this one has {}", columns.len())));
         };
-        let node: u32 = node.parse().map_err(|_| wrong("the first column is the number of a node".into()))?;
+        let node: u32 =
+            node.parse().map_err(|_| wrong("the first column must be the number of a node".into()))?;
         let mut vector = [0.0; 3];
         for (x, text) in vector.iter_mut().zip(components) {
             let number = text.parse().ok().filter(|x: &f64| x.is_finite());
@@ -170,11 +171,11 @@ mod tests {
     #[test]
     fn a_bad_row_is_told_with_its_line() {
         for (text, says) in [
-            ("0,0,0,0\n1,0,0\n", "motion.csv:2: a row has 4 columns, this one 3, found `1,0,0`"),
+            ("0,0,0,0\n1,0,0\n", "motion.csv:2: a row has 4 columns, but this one has 3, found `1,0,0`"),
             ("0,0,0,0\n\n1,0,x,0\n", "motion.csv:3: `x` is not a finite number"),
             ("0,0,nan,0\n", "motion.csv:1: `nan` is not a finite number"),
-            ("x,y,z,node\n0,0,0,0\n", "motion.csv:1: the first column is the number of a node"),
-            ("-1,0,0,0\n", "motion.csv:1: the first column is the number of a node"),
+            ("x,y,z,node\n0,0,0,0\n", "motion.csv:1: the first column must be the number of a node"),
+            ("-1,0,0,0\n", "motion.csv:1: the first column must be the number of a node"),
             ("4,0,0,0\n", "motion.csv:1: there is no node 4: the mesh has 4 nodes"),
             ("1,0,0,0\n1,0,0,0\n", "motion.csv:2: node 1 has a row already"),
         ] {

@@ -193,7 +193,7 @@ impl Meshed<'_> {
             return None;
         };
         let what = match (law.law.is_isotropic(), law.extras.prony.is_empty()) {
-            (false, _) => "is not the same in all directions",
+            (false, _) => "is not isotropic",
             (_, false) => "relaxes",
             _ => {
                 let moduli = law.law.small_strain();
@@ -223,7 +223,7 @@ impl Meshed<'_> {
         }
         if table.element == Some(Element::Comas2010) {
             let help = "take `dkt-opt`, or one `thickness` and `law`";
-            let message = format!("`{name}` has layers, and its element is of one material");
+            let message = format!("`{name}` has layers, but its element supports only one material");
             self.error(&["body", name, "element"], message, "not with `layers`", help);
             return None;
         }
@@ -237,9 +237,9 @@ impl Meshed<'_> {
         if let Some(number) = table.layers.iter().position(|layer| layer.young_modulus.is_some()) {
             let message =
                 format!("layer {number} of `{name}` is stiffer in one direction, but no direction is given");
-            let help = "add `fibre = [x, y, z]` to the body, `{ cell-data = \"name\" }` or a rule such as `around`: what angles \
-                        count from, projected on each triangle";
-            self.error(&["body", name, "layers", &number.to_string()], message, "from where?", help);
+            let help = "add to the body `fibre = [x, y, z]`, `fibre = { cell-data = \"name\" }` or a rule such as `around`; the angles of \
+                        layers count from this direction, projected onto each triangle";
+            self.error(&["body", name, "layers", &number.to_string()], message, "no direction", help);
             return None;
         }
         // The same in all directions: along an edge.
@@ -262,10 +262,10 @@ impl Meshed<'_> {
                     (Some(law), _) => (law, own.as_slice()),
                     (None, ByLabel::One(law)) => (law, whole.as_slice()),
                     (None, ByLabel::Each(_)) => {
-                        let message = format!("layer {number} of `{name}` has no elasticity");
+                        let message = format!("layer {number} of `{name}` has no elastic constants");
                         let help = "give it a `law`, or `young-modulus = [along, across]` with `poisson-ratio` and \
-                                    `shear-modulus`; or the body one `law`";
-                        self.error(&path, message, "of what?", help);
+                                    `shear-modulus`; or give the whole body one `law`";
+                        self.error(&path, message, "this layer", help);
                         return None;
                     }
                 };
@@ -284,9 +284,10 @@ impl Meshed<'_> {
             (Some(density), _) => density,
             (None, ByLabel::One(density)) => density.0,
             (None, ByLabel::Each(_)) => {
-                let message =
-                    format!("layer {number} of `{name}` has no density, and that of the body goes by label");
-                self.error(&path, message, "of which density?", "give the layer a `density`");
+                let message = format!(
+                    "layer {number} of `{name}` has no density, and the body has a density for each label"
+                );
+                self.error(&path, message, "this layer", "give the layer a `density`");
                 return None;
             }
         };
@@ -342,7 +343,12 @@ impl Meshed<'_> {
                             }
                             None => format!("the triangles of `{name}` have no labels"),
                         };
-                        self.error(&path, message, "by label", "give one thickness, or one for every label");
+                        self.error(
+                            &path,
+                            message,
+                            "given by label",
+                            "give one thickness, or one for every label",
+                        );
                         None
                     }
                 }
@@ -382,7 +388,7 @@ impl Meshed<'_> {
                 let creased = mesh.points.len() - given.len();
                 if creased > 0 {
                     self.notes.push(format!(
-                        "`{name}` is curved by the normals of its mesh, but for {} without one, which may be creases",
+                        "`{name}` is curved by the normals of its mesh, except at {} without a normal, which may be creases",
                         counted(creased, "node")
                     ));
                 } else if !is_sheet(&table.mesh) {
@@ -402,7 +408,7 @@ impl Meshed<'_> {
         let count = flat.iter().filter(|flat| **flat).count();
         if count > 0 {
             self.notes.push(format!(
-                "`{name}`: cell data `{FLAT_CELLS}` of the mesh keeps {} flat beside the curved ones",
+                "`{name}`: cell data `{FLAT_CELLS}` of the mesh keeps {} flat; all others are curved",
                 counted(count, "triangle")
             ));
         }
@@ -428,9 +434,9 @@ impl Meshed<'_> {
         let count = flat.values().filter(|(_, flat)| *flat).count();
         if count > 0 {
             self.notes.push(format!(
-                "`{name}`: {} of the membrane lie in one plane with all triangles round them, and without tension they have no \
-                 transverse stiffness: the static solver starts with an artificial stiffness, proportional to the residual, \
-                 which vanishes at equilibrium; `pre-tension` [N/m] gives a real one",
+                "`{name}`: {} of the membrane lie in one plane with all triangles around, where the membrane has no transverse \
+                 stiffness without tension. The static solver starts with an artificial stiffness, proportional to the \
+                 residual, which vanishes at equilibrium; `pre-tension` [N/m] gives a real one",
                 counted(count, "node")
             ));
         }
@@ -454,14 +460,14 @@ impl Meshed<'_> {
         }
         if let Some(stoutness) = notes.stoutness.filter(|&stoutness| stoutness > STOUT) {
             self.notes.push(format!(
-                "`{name}` is {stoutness:.2} times as thick as wide (twice its area over its border): transverse shear is \
-                 neglected, which makes such a strip about {:.0} % too stiff in torsion (0.63 times that)",
+                "`{name}` is {stoutness:.2} times as thick as wide (width: twice its area over its border). Transverse shear is \
+                 neglected, so a strip like this is about {:.0} % too stiff in torsion (0.63 times this ratio)",
                 63.0 * stoutness
             ));
         }
         if let Some((inverted, first)) = notes.inverted {
             let message = format!(
-                "{} of `{name}` folded back onto all neighbours, as inverted ones are: the first is triangle {first} (counted \
+                "{} of `{name}` folded back onto all neighbours, like inverted triangles: the first is triangle {first} (counted \
                  from 0)",
                 counted(inverted, "triangle")
             );

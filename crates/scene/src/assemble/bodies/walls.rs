@@ -19,8 +19,8 @@ impl Meshed<'_> {
         let scene = self.scene;
         let given = scene.bodies.iter().find(|(known, _)| known == host).map(|(_, table)| table);
         if self.source().node(&["body", name, "mesh"]).is_some() {
-            let message = format!("`{name}` has a mesh of its own, and is on `{host}`");
-            let help = "leave `mesh` out: its triangles are those of the boundary there";
+            let message = format!("`{name}` lies on `{host}`, but has a mesh of its own");
+            let help = "leave `mesh` out: the wall takes the triangles of the boundary";
             self.error(&["body", name, "mesh"], message, "not with `on`", help);
             return None;
         }
@@ -107,22 +107,22 @@ impl Meshed<'_> {
         let name = draft.name;
         let (message, label, help) = match draft.table.model {
             BodyModel::Membrane if law.law.families() == 0 && !law.law.is_isotropic() => (
-                format!("law `{law_name}` has axes of its own in space, and `{name}` is a membrane"),
+                format!("law `{law_name}` has fixed axes in space, and `{name}` is a membrane"),
                 "not for membranes",
                 "take an isotropic law, or one with fibres such as `holzapfel-gasser-ogden`",
             ),
             BodyModel::Bar if law.law.families() > 0 || !law.law.is_isotropic() => (
-                format!("law `{law_name}` has directions of its own, and `{name}` is a bar"),
+                format!("law `{law_name}` depends on the direction, and `{name}` is a bar"),
                 "not for bars",
                 "take an isotropic law: bars use its Young's modulus at small strain",
             ),
             model @ (BodyModel::Membrane | BodyModel::Bar) if !prony.volumetric.is_empty() => (
                 format!(
-                    "law `{law_name}` relaxes in volume, and `{name}` is a {}, which relaxes as a whole",
+                    "law `{law_name}` relaxes in volume, but `{name}` is a {}, whose whole stress relaxes alike",
                     model.word()
                 ),
                 "not in volume",
-                "give its terms `part = \"isochoric\"`: they act on all of its stress",
+                "give its terms `part = \"isochoric\"`: here they act on the whole stress",
             ),
             BodyModel::Solid if law.law.is_incompressible() => (
                 format!(
@@ -171,7 +171,7 @@ impl Meshed<'_> {
         });
         if let Some(at) = across {
             let cell = triangles[at / families];
-            let message = format!("the fibre of triangle {cell} of `{name}` stands across the wall");
+            let message = format!("the fibre of triangle {cell} of `{name}` is perpendicular to the wall");
             let help = "a membrane needs fibres in its plane: give another direction or rule there";
             self.error(&["body", name], message, "this body", help);
             return None;

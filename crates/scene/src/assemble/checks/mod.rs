@@ -87,8 +87,8 @@ impl Checked<'_> {
                 (true, false) => "gravity makes it fall",
                 (false, true) => "its loads push it away",
                 (true, true) => "gravity and its loads carry it away",
-                (false, false) if flies(name) => "it flies on as it started",
-                (false, false) => "and nothing moves it",
+                (false, false) if flies(name) => "it keeps its initial velocity",
+                (false, false) => "nothing moves it",
             };
             notes.push(format!("`{name}` is held by no constraint: {fate}"));
         }
@@ -106,7 +106,7 @@ impl Checked<'_> {
             let owner = self.assembly.bodies.iter().find(|body| body.nodes.contains(&node));
             let Some((name, first)) = owner.map(|body| (body.name.clone(), body.nodes.start)) else { return };
             let message = format!(
-                "`{name}` is free in {} of 6, and a static run needs every part constrained (this one has node {})",
+                "`{name}` is free in {} of 6, but a static run needs every part constrained, including the one with node {}",
                 counted(free_modes, "rigid motion"),
                 node - first
             );
@@ -151,7 +151,7 @@ impl Checked<'_> {
         };
         if share > MUCH {
             let place = self.source().span(&self.scene.run_at("mass-scaling"));
-            let help = "motions become slower than they are; add less, or remove it to see what it changes";
+            let help = "mass scaling slows motions down: add less, or run without it to compare";
             self.out.push(Diagnostic::warning(message).at(place, "more than 5 %").help(help));
         } else {
             self.notes.push(message);

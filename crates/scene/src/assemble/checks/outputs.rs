@@ -38,7 +38,7 @@ impl Checked<'_> {
         if let Some([low, high]) = view.range
             && low >= high
         {
-            self.error(&["view", "range"], "the range must grow", "here", "as in [0, 5e3]");
+            self.error(&["view", "range"], "the range must increase", "here", "as in [0, 5e3]");
         }
         if !matches!(target, Some(None)) {
             self.check_labels_of_view();
@@ -54,7 +54,7 @@ impl Checked<'_> {
                 let model = self.scene.bodies[body].1.model;
                 if model == BodyModel::Shell && field != FieldName::Displacement {
                     let message = format!(
-                        "surfaces that a body of model `{}` carries have a displacement and no `{}`",
+                        "surfaces on a body of model `{}` have only a displacement, not `{}`",
                         model.word(),
                         field.name()
                     );
@@ -82,7 +82,7 @@ impl Checked<'_> {
         if !fits {
             let help = match numbers {
                 9 => "give `component = \"xx\"`, `yy`, `zz`, `xy`, `yz` or `xz`",
-                3 => "`x`, `y` or `z`, or none for the size",
+                3 => "give `x`, `y` or `z`, or leave `component` out for the magnitude",
                 _ => "leave `component` out: it is a single number",
             };
             let at = if asked.is_some() { "component" } else { "colour" };
@@ -113,7 +113,7 @@ impl Checked<'_> {
         let labels = labels_of(&self.assembly, &self.bodies, &self.surfaces, view.on.as_deref());
         if labels.is_empty() && view.shows_labels() {
             let help =
-                "meshes of images with several `labels` have them, and mesh files with cell data `label`";
+                "labels come from images with several `labels`, or from mesh files with cell data `label`";
             let message = "the elements that are shown have no labels";
             self.error(&["view", "colour"], message, "no labels", help);
         }
@@ -149,7 +149,8 @@ impl Checked<'_> {
             );
         }
         if table.curved.is_some() && table.at == At::Points {
-            let message = "on a curved surface fields of cells are written on the cells";
+            let message =
+                "`at = \"points\"` is not for curved surfaces, where fields of cells stay on the cells";
             self.error(&at("at"), message, "not with `curved`", "leave `at` or `curved` out");
         }
     }
@@ -194,7 +195,7 @@ impl Checked<'_> {
             None => "no body touches".into(),
         };
         let what = if body.is_some() { "nothing" } else { "anything" };
-        let message = format!("{who} {what}, so that there is no `{}`", fields[index].name());
+        let message = format!("{who} {what}, so there is no `{}`", fields[index].name());
         let name = body.map_or("liver", |body| self.bodies[body].name.as_str()).to_owned();
         let help = format!(
             "add a contact: `[contact.NAME]` with `between = [\"{name}\", …]`, or leave the field out"
@@ -227,7 +228,7 @@ impl Checked<'_> {
                 self.refuse_fields_off_surfaces(&probe.data, surface, &at("data"));
                 if let Some(field) = probe.data.iter().find(|field| !field.is_nodal()) {
                     let message =
-                        format!("`{}` belongs to cells, and a probe on a surface has none", field.name());
+                        format!("`{}` is a field of cells, and a surface has only points", field.name());
                     self.error(
                         &at("data"),
                         message,
@@ -241,7 +242,7 @@ impl Checked<'_> {
                 let place = Vector3::from(probe.at);
                 let distance = self.bodies[body].locator().locate(&place).map(|found| found.distance);
                 let distance = distance.unwrap_or(0.0);
-                let help = "give its place at rest in metres; the nearest cell carries it";
+                let help = "give the place of the probe at rest in metres; the nearest cell carries it";
                 self.doubt_place(&format!("probe `{name}`"), distance, body, &at("at"), help);
             }
             None => {}
@@ -253,7 +254,7 @@ impl Checked<'_> {
     fn refuse_fields_off_surfaces(&mut self, fields: &[FieldName], surface: usize, path: &[&str]) {
         let on_shell = self.assembly.carried.contains_key(&surface);
         if let Some(field) = fields.iter().find(|field| on_shell && **field != FieldName::Displacement) {
-            let message = format!("surfaces on shells have a displacement and no `{}`", field.name());
+            let message = format!("surfaces on shells have only a displacement, not `{}`", field.name());
             self.error(path, message, "not on a surface", "write it on the body");
             return;
         }
