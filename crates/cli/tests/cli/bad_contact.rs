@@ -193,7 +193,11 @@ fn states_that_cannot_begin_are_refused_with_their_places() {
         let above = SQUARE.map(|[x, y, z]| [x, y, z + gap]);
         vtk(&[SQUARE, above].concat(), &[&[0, 1, 2], &[0, 2, 3], &[4, 5, 6], &[4, 6, 7]], "")
     };
-    accepted(&itself, &leaf(5e-8), &["never touch, since they are in one place at rest", "2 separate parts"]);
+    accepted(
+        &itself,
+        &leaf(5e-8),
+        &["never touch, because they are in one place at rest", "2 separate parts"],
+    );
     accepted(&itself, &leaf(5e-4), &["2 separate parts"]);
     refused(
         &changed(SOLID, "\"implicit\"\nstep = 0.05", "\"static\""),

@@ -54,7 +54,7 @@ fn a_curved_surface_that_is_none_is_refused() {
         ),
         (
             with(implicit, "subdivision = 1"),
-            ["only shells have a curved surface, and `block` is none", "leave it out"],
+            ["only shells have a curved surface, and `block` is not a shell", "leave it out"],
         ),
         (
             with(implicit, "subdivision = 3"),
@@ -71,5 +71,5 @@ fn a_curved_surface_that_is_none_is_refused() {
     )
     .replace("['block', 'ball']\n", "['coat', 'ball']\nthickness = 0\nsubdivision = 1\n");
     let message = world(&coated).err().unwrap();
-    assert!(message.contains("of `coat` follows others by a tie"), "{message}");
+    assert!(message.contains("of `coat` to another body"), "{message}");
 }

@@ -77,7 +77,7 @@ fn bodies_that_overlap_are_pushed_apart_for_a_barrier() {
     let refused = world(&text).err().unwrap();
     assert!(
         refused.contains("no gap at the start")
-            && refused.contains("let `gap = 2e-4` or `separate = true` part them"),
+            && refused.contains("push the bodies apart with `gap = 2e-4` or `separate = true`"),
         "{refused}"
     );
     let text = text.replace("barrier-distance = 2e-4", "barrier-distance = 2e-4\nseparate = true");
@@ -265,7 +265,7 @@ fn a_tied_coat_is_pressed_as_one_on_the_nodes_of_its_block() {
     resumes(&coated(run, "shell", "[7, 9]", "rotations = 'follow'\n"));
     let rigid = "[constraint.bone]\ntype = 'rigid'\nbody = 'block'\nnodes = { set = 'z-max' }\n";
     let message = world(&coated(run, "shell", "[7, 9]", rigid)).err().unwrap();
-    assert!(message.contains("follows others by a rigid part or a mean"), "{message}");
+    assert!(message.contains("is bound to other nodes by a rigid part or a mean"), "{message}");
 }
 
 /// Each mistake is refused with its place and a remedy.
@@ -277,7 +277,7 @@ fn mistakes_are_refused() {
             pressed(implicit, &FLOOR.replace("-2e-5", "1e-4")),
             [
                 "contact `below` has no gap at the start in 49 places: node 0 of `block` at (0, 0, 0) m",
-                "`separate = true` part them",
+                "or `separate = true`, move one of them",
             ],
         ),
         (

@@ -47,7 +47,7 @@ fn what_is_nearer_at_the_start_keeps_its_distance() {
     let note = world(&text).unwrap();
     let note =
         note.notes().find(|note| note.contains("nearer at the start than 0.001000 m")).unwrap().clone();
-    assert!(note.contains("contact `above`: ") && note.contains("keep that distance"), "{note}");
+    assert!(note.contains("contact `above`: ") && note.contains("keep the distance of the start"), "{note}");
     let [row, touching] = [&text, &stacked("", "")].map(|text| last_row(text));
     let [higher, other] = [&row, &touching].map(|row| row["probe.top.displacement.z"]);
     println!("{note}; the lid lies {} m higher", higher - other);

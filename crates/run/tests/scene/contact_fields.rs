@@ -272,11 +272,11 @@ fn overlaps_that_cannot_be_undone_are_refused_with_what_is_left() {
         (overlapping(0.009, &fixed("block")), ["would invert element", "overlaps must be smaller"]),
         (
             stacked("", "").replace("at = [0.005, 0.005, 0.0205]", "at = [0.005, 0.005, 0.019]"),
-            ["`lid` and `block` overlap at the start in", "`separate = true` part them"],
+            ["`lid` and `block` overlap at the start in", "push them apart with `gap` or `separate = true`"],
         ),
         (
             pressed("", "").replace("0.0301]", "0.0285]"),
-            ["in `ball` at the start", "`separate = true` part them"],
+            ["in `ball` at the start", "push them apart with `gap` or `separate = true`"],
         ),
     ] {
         crate::assert_refused(&text, &pieces);

@@ -160,7 +160,7 @@ fn contacts_of_participants_that_cannot_be_are_refused_with_the_line() {
         (
             "friction = 0.3",
             "separate = true",
-            ["`separate` is for bodies of one participant", "move one of them"],
+            ["`separate` is for bodies of one participant", "move one of the bodies"],
         ),
         (
             "friction = 0.3",

@@ -176,7 +176,7 @@ fn impossible_goals_are_told() {
 #[test]
 fn jaws_that_cannot_be_are_refused_with_their_line() {
     for (tool, pieces) in [
-        ("inside = true", ["no body is inside of a jaw", "scene.toml:22:"]),
+        ("inside = true", ["`inside` is not for jaws", "scene.toml:22:"]),
         ("opening = { angle = -1 }", ["angle", "opening"]),
         ("ideal-grip = -1", ["ideal-grip", "-1"]),
     ] {

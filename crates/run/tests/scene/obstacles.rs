@@ -202,9 +202,9 @@ fn shapes_that_cannot_be_are_refused_with_their_line() {
         ),
         (
             mesh(&whole, ", resolution = 1e-5"),
-            ["MiB, more than 256 MiB", "fits; without it a grid is chosen"],
+            ["MiB, more than 256 MiB", "or leave it out: Pliant then chooses a grid"],
         ),
-        (mesh(&whole, ", grow = -0.06"), ["encloses nothing", "goes inward by more than it is thick"]),
+        (mesh(&whole, ", grow = -0.06"), ["encloses nothing", "inward by more than its thickness"]),
         (mesh(&whole, ", grown = 1"), ["`grown`", "`grow`"]),
         (format!("{{ image = {{ file = '{image}', label = 3 }} }}"), ["3", "7"]),
         ("{ image = { file = 'none.nii', label = 1 } }".into(), ["none.nii", "relative to the scene file"]),
@@ -225,6 +225,6 @@ fn a_shape_much_larger_than_the_bodies_is_doubted() {
     let world = world(&text).unwrap();
     let doubts = &world.participants[0].built.warnings;
     let doubt = doubts.iter().find(|doubt| doubt.message.contains("`bowl`")).unwrap();
-    assert!(doubt.message.contains("times the bodies"), "{}", doubt.message);
+    assert!(doubt.message.contains("times the size of the bodies"), "{}", doubt.message);
     assert!(doubt.help.iter().any(|help| help.contains("0.001")), "{:?}", doubt.help);
 }

@@ -38,8 +38,8 @@ impl Context<'_> {
             CurveShape::Polynomial => Shape::Polynomial,
             CurveShape::Hold => Shape::Hold,
             CurveShape::Wave(_) if timing.to.is_some() => {
-                let help = "leave out `to`: a wave goes on to the end of the scene";
-                self.error(&at("to"), "a wave does not end", "here", help);
+                let help = "leave out `to`: a wave lasts until the end of the scene";
+                self.error(&at("to"), "a wave takes no `to`", "here", help);
                 return None;
             }
             CurveShape::Wave(period) if *period <= 0.0 => {
@@ -59,7 +59,7 @@ impl Context<'_> {
                 }
                 if timing.to.is_some() || timing.from != 0.0 {
                     let help = "leave out `from` and `to`: the table has its own times";
-                    self.error(&at("curve"), "a table goes with neither `from` nor `to`", "this table", help);
+                    self.error(&at("curve"), "a table takes neither `from` nor `to`", "this table", help);
                     return None;
                 }
                 Shape::Table(points.iter().map(|&[time, factor]| (time, factor)).collect())
@@ -68,7 +68,7 @@ impl Context<'_> {
         if to <= timing.from && shape != Shape::Hold {
             let message = format!("`to` ({to} s) must be later than `from` ({} s)", timing.from);
             let key = if timing.to.is_some() { "to" } else { "from" };
-            self.error(&at(key), message, "here", "`to` is the end of the scene unless it is given");
+            self.error(&at(key), message, "here", "the default of `to` is the end of the scene");
             return None;
         }
         self.note_timing(&shape, [timing.from, to], path);
@@ -88,7 +88,7 @@ impl Context<'_> {
         if begins >= until && begins > 0.0 {
             let message = format!("`{name}` begins at {begins} s, but the scene ends at {until} s");
             let place = self.source().key_span(path);
-            let help = "let it begin earlier, or the scene last longer (`until`)";
+            let help = "start it earlier, or extend the scene (`until`)";
             self.out.push(Diagnostic::warning(message).at(place, "never begins").help(help));
         } else if ends > until {
             self.notes.push(format!("`{name}` is complete at {ends} s, but the scene ends at {until} s"));
@@ -105,7 +105,7 @@ impl Context<'_> {
             (None, Some(degrees)) => Some(degrees.to_radians()),
             (angle, _) => {
                 let found = if angle.is_some() { "both" } else { "neither" };
-                let message = format!("an angle is given by `angle` or by `degrees`, found {found}");
+                let message = format!("an angle needs either `angle` or `degrees`, found {found}");
                 let help = "`angle` in radians, `degrees` in degrees";
                 self.error(path, message, "this angle", help);
                 None
@@ -117,7 +117,10 @@ impl Context<'_> {
     pub(super) fn note_turns(&mut self, what: &str, angle: f64) {
         let turns = angle.abs() / TAU;
         if turns > 1.0 + 1e-9 {
-            self.notes.push(format!("{what}: {} rad are {turns:.1} turns: degrees?", number(angle)));
+            self.notes.push(format!(
+                "{what}: {} rad are {turns:.1} turns: is the angle meant in degrees?",
+                number(angle)
+            ));
         }
     }
 }

@@ -230,7 +230,7 @@ fn numbers_out_of_range_are_refused() {
             "curve = { wave = -1 }",
             "the period of the wave must be greater than 0, found -1",
         ),
-        ("curve = \"smooth-step\"", "curve = { wave = 1 }\nto = 2", "a wave does not end"),
+        ("curve = \"smooth-step\"", "curve = { wave = 1 }\nto = 2", "a wave takes no `to`"),
     ] {
         spoilt(good, bad, &[says]);
     }

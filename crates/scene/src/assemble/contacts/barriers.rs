@@ -73,7 +73,7 @@ impl Loaded<'_> {
             let message = match is_meet {
                 true => format!("`{key}` of a contact is for bodies of one participant with {solvers}"),
                 false => format!(
-                    "`{key}` of a contact is for {solvers}, and this scene goes with `{}`",
+                    "`{key}` of a contact is for {solvers}, but the solver of this scene is `{}`",
                     self.scene.run.solver.word()
                 ),
             };
@@ -130,7 +130,8 @@ impl Loaded<'_> {
         if shells.is_empty() {
             let names: Vec<String> =
                 bodies.iter().map(|&body| format!("`{}`", self.bodies[body].name)).collect();
-            let message = format!("only shells have a curved surface, and {} is none", names.join(" or "));
+            let message =
+                format!("only shells have a curved surface, and {} is not a shell", names.join(" or "));
             self.error(&path, message, "no shell", "leave it out");
             return None;
         }
@@ -142,8 +143,8 @@ impl Loaded<'_> {
             .find(|node| follows[*node as usize] || turns.contains(node));
         if let Some(node) = bound {
             let (body, node) = self.assembly.locate_node(node);
-            let message = format!("node {node} of `{}` follows others by a tie", self.bodies[body].name);
-            self.error(&path, message, "bound to others", "leave it out: flat triangles touch then");
+            let message = format!("a tie binds node {node} of `{}` to another body", self.bodies[body].name);
+            self.error(&path, message, "tied nodes", "leave it out: contact then uses flat triangles");
             return None;
         }
         Some(level)
@@ -183,7 +184,7 @@ impl Loaded<'_> {
         });
         if let Some(jaw) = held {
             let message = format!(
-                "`{}` has an `ideal-grip`, which the solver `{}` does not know",
+                "`{}` has an `ideal-grip`, which the solver `{}` does not support",
                 jaw.tool,
                 self.scene.run.solver.word()
             );
@@ -231,7 +232,7 @@ impl Started<'_> {
         for (contact, count) in contacts.contacts.iter().zip(apart_counts(&model, &self.assembly)) {
             if count > 0 {
                 self.notes.push(format!(
-                    "contact `{}`: {} of nodes with triangles or of edges never touch, since they are in one place at rest",
+                    "contact `{}`: {} (a node and a triangle, or two edges) never touch, because they are in one place at rest",
                     contact.name,
                     counted(count, "pair")
                 ));
@@ -263,11 +264,11 @@ impl Started<'_> {
         let asked = self.scene.contacts.iter().find(|(known, _)| known == table).map(|(_, table)| table);
         let help = match asked {
             Some(table) if table.separate || table.gap.is_some() => {
-                "move one of them (`at`), make `thickness` smaller, or take finer cells there: what overlaps must be smaller than them"
+                "move one of them (`at`), make `thickness` smaller, or take finer cells there: overlaps must be smaller than the cells"
             }
             _ => {
-                "let `gap = 2e-4` or `separate = true` part them, move one of them (`at`), or make `thickness` smaller: a barrier can't \
-                 begin within another body"
+                "push the bodies apart with `gap = 2e-4` or `separate = true`, move one of them (`at`), or make `thickness` smaller: \
+                 a barrier needs a gap at the start"
             }
         };
         self.error(&["contact", table, "between"], message, "no gap", help);

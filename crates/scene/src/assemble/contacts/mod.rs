@@ -30,7 +30,7 @@ use barriers::BarrierTables;
 pub(super) const OVERLAP: f64 = 1e-9;
 
 /// The remedy for contact with other solvers.
-const EXPLICIT: &str = "take `solver = \"explicit\"` on the CPU, for solids, membranes and bars, or `\"implicit\"` or `\"static\"`, for solids and shells";
+const EXPLICIT: &str = "take `solver = \"explicit\"` on the CPU (solids, membranes, bars), or `\"implicit\"` or `\"static\"` (solids, shells)";
 
 /// The distance [m] that surfaces keep without a barrier if none is given, over the mean edge of both. Sharp
 /// parts slip by each other where it is zero.
@@ -52,7 +52,7 @@ pub(crate) fn told_distance(name: &str, [least, most]: [f64; 2]) -> String {
         false => format!("{} to {}", number(least), number(most)),
     };
     format!(
-        "contact `{name}`: surfaces keep {range} m, {} % of their mean edge, since `thickness` is not given",
+        "contact `{name}`: surfaces keep {range} m apart, {} % of their mean edge, because `thickness` is not given",
         100.0 * KEPT
     )
 }
@@ -282,7 +282,7 @@ impl Loaded<'_> {
         let solver = self.scene.run.solver;
         if solver != SolverName::Explicit && !is_barrier {
             let message = format!(
-                "contact is for the solvers `explicit`, `implicit` and `static`, and this scene goes with `{}`",
+                "contact is for the solvers `explicit`, `implicit` and `static`, but the solver of this scene is `{}`",
                 solver.word()
             );
             self.error(&["contact", name, "between"], message, "not for this solver", EXPLICIT);
@@ -293,7 +293,7 @@ impl Loaded<'_> {
         }
         if table.separate && table.gap.is_some() {
             let message =
-                "`gap` and `separate` part the same bodies: shapes at rest, or the state at the start";
+                "`gap` moves the same bodies apart at rest that `separate` moves apart at the start";
             self.error(&["contact", name, "gap"], message, "one too many", "leave one of them out");
             return false;
         }
@@ -322,7 +322,7 @@ impl Loaded<'_> {
         }
         if pairs.is_empty() {
             let help = "name a body first: `between = [\"liver\", \"probe\"]`";
-            self.error(&["contact", name, "between"], "no body touches anything here", "no body", help);
+            self.error(&["contact", name, "between"], "this contact has no body", "no body", help);
             return None;
         }
         Some(pairs)
@@ -378,10 +378,10 @@ impl Loaded<'_> {
         let known: Vec<&str> =
             known.chain(rigids.iter().map(|rigid| rigid.name.as_str())).chain(["all"]).collect();
         let help = suggestion(wanted, &known, "the scene", "bodies, obstacles and tools");
-        let help = format!("{help}; bodies that touch each other are of one participant");
+        let help = format!("{help}; both bodies must be in one participant");
         let place = ["0", "1"][side];
         let message = format!("there is no body, obstacle or tool `{wanted}`");
-        self.error(&["contact", name, "between", place], message, "no such thing", help);
+        self.error(&["contact", name, "between", place], message, "no such name", help);
         None
     }
 
@@ -391,7 +391,8 @@ impl Loaded<'_> {
         let own = self.bodies[body].name.clone();
         let is_barrier = self.scene.run.solver.solves_equations();
         if self.shell_cells(body).is_some() && !is_barrier {
-            let message = format!("contact is for solids, membranes and bars, and `{own}` is a shell");
+            let message =
+                format!("explicit contact is for solids, membranes and bars, and `{own}` is a shell");
             self.error(&path, message, "a shell", EXPLICIT);
             return None;
         }
@@ -433,7 +434,7 @@ impl Loaded<'_> {
         };
         if let Some(&node) = nodes.iter().find(moved) {
             let message = format!(
-                "node {} of `{own}` follows others by {}",
+                "node {} of `{own}` is bound to other nodes by {}",
                 self.assembly.locate_node(node).1,
                 if is_barrier { "a rigid part or a mean" } else { "a tie, a rigid part, a mean or a volume" }
             );
@@ -459,14 +460,14 @@ impl Loaded<'_> {
         });
         if count > 0 {
             self.notes.push(format!(
-                "contact `{name}`: {} of nodes with faces or of edges never touch, since they are too near each other, or behind each other, at rest",
+                "contact `{name}`: {} (a node and a face, or two edges) never touch, because they are too near or behind each other \
+                 at rest",
                 counted(count, "pair")
             ));
         }
         if let Some((gap, at)) = narrow {
             self.notes.push(format!(
-                "contact `{name}`: a gap of {} m at {} is less than a quarter of the edges there are on average; smaller \
-                 elements resolve it better",
+                "contact `{name}`: the gap of {} m at {} is less than a quarter of the mean edge; smaller elements resolve it better",
                 number(gap),
                 in_metres(at)
             ));
@@ -486,7 +487,7 @@ impl Loaded<'_> {
         for body in bodies {
             if self.bodies[body].mesh.volume_blocks().all(|block| block.is_empty()) {
                 let message = format!(
-                    "bodies that touch each other are solids, and `{}` is none",
+                    "only solids can touch each other, and `{}` is not a solid",
                     self.bodies[body].name
                 );
                 let help = "name the solid under it, or let it touch obstacles and tools only";
@@ -502,7 +503,7 @@ impl Loaded<'_> {
             return;
         }
         let Some(message) = told_overlap([&names[0], &names[1]], &inside) else { return };
-        let help = "move one of them (`at` of its mesh), or let `gap` or `separate = true` part them";
+        let help = "move one of them (`at` of its mesh), or push them apart with `gap` or `separate = true`";
         self.error(&path, message, "overlapping", help);
     }
 
@@ -558,7 +559,7 @@ impl Loaded<'_> {
             number(-gap),
             in_metres(*place)
         );
-        let help = "move one of them (`at`), make `thickness` smaller, or let `gap` or `separate = true` part them; \
+        let help = "move one of them (`at`), make `thickness` smaller, or push them apart with `gap` or `separate = true`; \
                     `inside = true` is for bodies within an obstacle";
         self.error(&["contact", name, "between"], message, "overlapping", help);
     }
@@ -574,7 +575,12 @@ impl InContact<'_> {
             let parts = [("separate", table.separate), ("gap", table.gap.is_some())];
             if let Some((key, _)) = parts.into_iter().find(|(_, given)| *given) {
                 let message = format!("`{key}` is for bodies of one participant");
-                own.error(&["contact", name, key], message, "of two participants", "move one of them");
+                own.error(
+                    &["contact", name, key],
+                    message,
+                    "between participants",
+                    "leave it out, and move one of the bodies (`at`)",
+                );
                 return None;
             }
             if !own.check_keys_of_contact(name, table, false) {
@@ -621,7 +627,7 @@ impl InContact<'_> {
             *near = pairs.map_or_else(Vec::new, |mut pairs| pairs.nearer(place));
             if !near.is_empty() {
                 notes.push(format!(
-                    "contact `{}`: {} nearer at the start than {} m and {} that distance",
+                    "contact `{}`: {} nearer at the start than {} m and {} the distance of the start",
                     contact.name,
                     match near.len() {
                         1 => "1 node is".to_owned(),

@@ -110,14 +110,14 @@ impl Loaded<'_> {
         let fault = |error: MeshingError| {
             let help = match &error {
                 MeshingError::OpenSurface { .. } => {
-                    "close it in the program that made it; holes narrower than `resolution` are closed here"
+                    "close the surface in the program that made it; Pliant closes only holes narrower than `resolution`"
                 }
                 MeshingError::NoSurface => "it needs triangles, quads, tets or hexes",
                 MeshingError::NothingEnclosed if grow < 0.0 => {
-                    "the surface goes inward by more than it is thick"
+                    "take a smaller shift: `grow` moves the surface inward by more than its thickness"
                 }
                 MeshingError::NothingEnclosed => "give a surface around a volume",
-                _ => "`pliant info` tells about a mesh file",
+                _ => "run `pliant info` on the file for details",
             };
             let key = match &error {
                 MeshingError::NothingEnclosed if grow < 0.0 => "grow",
@@ -140,14 +140,14 @@ impl Loaded<'_> {
         let spacing = resolution.unwrap_or_else(|| fitting(chosen, MOST_POINTS[0]));
         if points(spacing) > MOST_POINTS[1] {
             let message = format!(
-                "a grid of {} m has {:.3e} points in {:.0} MiB, more than {:.0} MiB",
+                "a grid of {} m has {:.3e} points and takes {:.0} MiB, more than {:.0} MiB",
                 number(spacing),
                 points(spacing),
                 points(spacing) * MEBIBYTES,
                 MOST_POINTS[1] * MEBIBYTES
             );
             let fits = fitting(spacing, MOST_POINTS[1]);
-            let help = format!("`resolution = {fits:.1e}` fits; without it a grid is chosen");
+            let help = format!("take `resolution = {fits:.1e}`, or leave it out: Pliant then chooses a grid");
             return Err(("resolution", message, help));
         }
         let progress =
@@ -182,7 +182,7 @@ impl Loaded<'_> {
             return;
         }
         let message = format!(
-            "`{}` is {} m across, {:.0} times the bodies ({} m)",
+            "`{}` is {} m across, {:.0} times the size of the bodies ({} m)",
             path[1],
             number(rounded(size)),
             size / bodies,

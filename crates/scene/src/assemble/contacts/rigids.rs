@@ -77,7 +77,7 @@ impl Loaded<'_> {
             ShapeName::Capsule(of) => Shape::Capsule { radius: of.radius, length: of.length },
             ShapeName::Cylinder(of) => Shape::Cylinder { radius: of.radius, length: of.length },
             ShapeName::Box(of) if of.size.iter().any(|&edge| edge <= 0.0) => {
-                self.error(&at, "a box without a volume", "its edges", "give three lengths above 0");
+                self.error(&at, "the box has no volume", "its edges", "give three lengths above 0");
                 return None;
             }
             ShapeName::Box(of) => Shape::Cuboid { size: of.size },
@@ -108,7 +108,8 @@ impl Loaded<'_> {
         let ways = [table.by.is_some(), table.rotate.is_some(), table.poses.is_some()];
         if ways.iter().filter(|&&given| given).count() > 1 {
             let help = "leave all but one out";
-            self.error(&thing.path(), "it moves by one of `by`, `rotate` and `poses`", "several", help);
+            let message = format!("{kind} `{name}` has more than one of `by`, `rotate` and `poses`");
+            self.error(&thing.path(), message, "several motions", help);
             return None;
         }
         if let Some(shift) = table.by {
@@ -151,8 +152,7 @@ impl Loaded<'_> {
         };
         self.notes.extend(jump.map(|Jump { time, speed, late }| {
             format!(
-                "{} `{}`: by its table of poses it goes at {} m/s from t = {} s on; it goes at {FASTEST} m/s and is late by up to \
-                 {} s",
+                "{} `{}`: its table of poses needs {} m/s from t = {} s on; Pliant moves it at {FASTEST} m/s, up to {} s late",
                 thing.kind,
                 thing.name,
                 number(speed),
@@ -173,8 +173,8 @@ impl Loaded<'_> {
     ) -> Option<Vec<Rigid>> {
         let Thing { kind, name, table } = thing;
         if table.inside {
-            let help = "bodies are between the jaws, and outside of each";
-            self.error(&thing.at("inside"), "no body is inside of a jaw", "of a tool with jaws", help);
+            let help = "leave it out: bodies lie between the jaws, outside of each";
+            self.error(&thing.at("inside"), "`inside` is not for jaws", "a tool with jaws", help);
             return None;
         }
         let opening = match &table.opening {
@@ -215,7 +215,7 @@ impl Loaded<'_> {
         let path = thing.at("grows");
         if thing.has_jaws() {
             let help = "leave it out, or take another shape";
-            self.error(&path, "jaws do not grow", "of a tool with jaws", help);
+            self.error(&path, "jaws do not grow", "a tool with jaws", help);
             return None;
         }
         let curve = self.curve(&growth.timing, &path)?;
@@ -224,7 +224,7 @@ impl Loaded<'_> {
         let round = matches!(shape, Shape::Sphere { .. } | Shape::Capsule { .. });
         if least < 0.0 && (thing.table.inside || !round) {
             let message = format!(
-                "it shrinks to {} m within its shape, which only balls and capsules can",
+                "`grows` reaches {} m, but only spheres and capsules without `inside` can shrink below their shape",
                 number(least)
             );
             let help = "give the shape its smallest size, and let it grow from there";
@@ -232,8 +232,11 @@ impl Loaded<'_> {
             return None;
         }
         if least <= -thinnest {
-            let message =
-                format!("it shrinks by {} m, and its radius is {} m", number(-least), number(thinnest));
+            let message = format!(
+                "the shape shrinks by {} m, but its radius is {} m",
+                number(-least),
+                number(thinnest)
+            );
             self.error(&path, message, "nothing is left", "let it shrink by less");
             return None;
         }

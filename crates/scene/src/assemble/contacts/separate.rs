@@ -180,7 +180,7 @@ impl<'s> InContact<'s> {
             number(depth),
             in_metres(*at)
         );
-        let help = "move one of them (`at`), or release nodes that constraints hold there";
+        let help = "move one of them (`at`), or release constrained nodes there";
         self.error(&["contact", name, key], message, "still overlapping", help);
     }
 

@@ -441,7 +441,7 @@ mod tests {
         assert!((quarter - std::f64::consts::FRAC_PI_2).abs() < 1e-15 && !notes.contains("turns"), "{notes}");
         let (large, notes) = turned("angle = 90");
         assert_eq!(large, 90.0);
-        let note = "`constraint.top.rotate.angle`: 90.00 rad are 14.3 turns: degrees?";
+        let note = "`constraint.top.rotate.angle`: 90.00 rad are 14.3 turns: is the angle meant in degrees?";
         assert!(notes.contains(note), "{notes}");
         assert!(!turned("angle = 6.2831853").1.contains("turns"));
         for (angle, found) in [("", "neither"), (", angle = 1, degrees = 60", "both")] {
