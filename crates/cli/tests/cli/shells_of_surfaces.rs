@@ -147,7 +147,7 @@ fn the_nodes_of_a_sharp_rim_are_creases() {
     println!("lens: {angle:.1}° at most, {without} nodes without");
     assert!(angle <= 60.0, "{angle}");
     assert_eq!(without_normal(&report), without as u64);
-    assert!(without == 0 || run.words().contains("without one, which may be creases"), "{}", run.err);
+    assert!(without == 0 || run.words().contains("without a normal, which may be creases"), "{}", run.err);
 }
 
 /// Every closed organ at hand, with the factor that makes its lengths metres.

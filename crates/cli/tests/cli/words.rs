@@ -288,7 +288,7 @@ fn a_scene_says_labels_by_name_and_masks_and_is_asked_about_units() {
         ("{ image = \"seg.dcm\", label = \"lung\", edge = 0.008 }", 2, "no label is named `lung`"),
         ("{ image = \"seg.dcm\", label = 1, names = \"none.txt\", edge = 0.008 }", 2, "cannot open"),
         ("{ file = \"ball.stl\", as = \"tets\", edge = 8.0 }", 2, "probably millimetres"),
-        ("{ file = \"ball.stl\", as = \"tets\", edge = 0.008, scale = 0.001 }", 0, "what it encloses"),
+        ("{ file = \"ball.stl\", as = \"tets\", edge = 0.008, scale = 0.001 }", 0, "its interior"),
     ] {
         let output = scene(mesh).pliant(&["check", "case"]);
         assert_eq!(output.code, code, "{mesh}: {}", output.err);

@@ -61,7 +61,7 @@ fn a_scene_fills_or_covers_the_surface_of_a_file() {
     workshop.write("case/scene.toml", scene("shells = 80, as = \"shells\"", wall, "implicit"));
     let output = workshop.check(&[]);
     assert!(
-        output.status() == "checked" && output.out.contains("what it encloses, 80 shells"),
+        output.status() == "checked" && output.out.contains("its interior, 80 shells"),
         "{}{}",
         output.out,
         output.err

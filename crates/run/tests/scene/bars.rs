@@ -141,8 +141,8 @@ fn what_bars_cannot_be_is_refused_by_name() {
             "young-modulus = 1e6\npoisson-ratio = 0.3\nfibre-modulus = 1e3",
             vec![],
         ),
-        (lines, "mesh = { lines = [[[0, 0, 0]]] }", vec!["two points at least"]),
-        (lines, "mesh = { lines = [[[0, 0, 0], [0, 0, 0]]] }", vec!["of no length"]),
+        (lines, "mesh = { lines = [[[0, 0, 0]]] }", vec!["at least two points"]),
+        (lines, "mesh = { lines = [[[0, 0, 0], [0, 0, 0]]] }", vec!["without length"]),
         (
             lines,
             "mesh = { lines = [[[0, 0, 0], [0, 0, 1]]], edge = 1e-9 }",

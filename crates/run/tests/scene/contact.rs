@@ -360,7 +360,7 @@ fn growth_that_cannot_be_is_refused() {
                 "shape = 'half-space'",
                 "shape = 'half-space'\ngrows = { by = 1, curve = { table = [[0, 0], [1, -0.001]] } }",
             ),
-            ["which only balls and capsules can", "grow from there"],
+            ["only spheres and capsules without `inside` can", "grow from there"],
         ),
         (
             with(

@@ -28,7 +28,7 @@ fn bodies_keep_a_distance_if_none_is_given() {
     for name in ["above", "itself"] {
         let note = format!("contact `{name}`: surfaces keep ");
         let note = known.notes().find(|own| own.starts_with(&note)).unwrap();
-        assert!(note.contains("0.5 % of their mean edge, since `thickness` is not given"), "{note}");
+        assert!(note.contains("0.5 % of their mean edge, because `thickness` is not given"), "{note}");
     }
     assert!(!known.notes().any(|note| note.contains("contact `below`")));
     assert_eq!(offsets(&usual.replace("friction = 0.3\n", "friction = 0.3\nthickness = 0\n"))[1], 0.0);

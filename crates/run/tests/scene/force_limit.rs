@@ -250,7 +250,7 @@ fn what_is_blocked_tells_its_force() {
 #[test]
 fn limits_of_moved_nodes_that_cannot_be_kept_are_refused() {
     let error = world(&driven("solver = 'explicit'", "force-limit = 2", 1.0)).unwrap_err();
-    assert!(error.contains("the solver `explicit` keeps no limit of the force of `push`"), "{error}");
+    assert!(error.contains("the solver `explicit` cannot limit the force of `push`"), "{error}");
     let text = driven("solver = 'static'", "force-limit = 2", 1.0);
     let shared = "[constraint.also]\ntype = 'fix'\nbody = 'plate'\nnodes = { set = 'x-min' }\n";
     let error = world(&format!("{text}{shared}")).unwrap_err();

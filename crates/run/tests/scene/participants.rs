@@ -171,13 +171,16 @@ fn mistakes_of_participants_are_underlined() {
     for (text, says) in [
         (table("['strop']", ""), "there is no body `strop` (help: did you mean `strip`?)"),
         (table("[]", ""), "participant `walls` has no body"),
-        (table("['strip', 'cube']", ""), "they do not go together with the solver `explicit`"),
+        (table("['strip', 'cube']", ""), "the solver `explicit` takes only one of both kinds"),
         (table("['strip', 'strip']", ""), "`strip` is named twice"),
         (
             table("['strip']", "[participant.other]\nbodies = ['strip']\n"),
             "`strip` goes with participant `walls` already",
         ),
-        (table("['strip']", "mass-scaling = { target-step = 1 }\n"), "mass is not scaled for shells"),
+        (
+            table("['strip']", "mass-scaling = { target-step = 1 }\n"),
+            "`mass-scaling` is not available for shells",
+        ),
         (
             format!("{}[load.p]\ntype = 'force'\non = 'strep'\nnodes = 'all'\ntotal = [0, 0, 1]\n", both("")),
             "there is no body or surface `strep` (help: did you mean `strip`?)",

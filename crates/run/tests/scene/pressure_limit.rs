@@ -173,7 +173,7 @@ fn limits_of_pressure_that_cannot_be_kept_are_refused() {
         let text = balloon("membrane", &run, &format!("{FILLED}\npressure-limit = 5000"), "");
         let message = world(&text).err().unwrap();
         assert!(
-            message.contains(&format!("the solver `{solver}` keeps no limit of the pressure of `air`")),
+            message.contains(&format!("the solver `{solver}` cannot limit the pressure of `air`")),
             "{message}"
         );
     }

@@ -213,7 +213,7 @@ fn bodies_that_the_solver_cannot_take_are_refused_by_name() {
         (block(newton, "tet4-ianp", &plain, ""), ["`tet4-ianp` couples", "take `tet4-anp`"]),
         (
             block("solver = 'static'\nprecision = 'single'", "tet4", &plain, ""),
-            ["`solver = \"static\"` are computed in double", ""],
+            ["`solver = \"static\"` use double precision only", ""],
         ),
         (
             block("solver = 'explicit'\nlinear = 'direct'", "tet4", &plain, ""),

@@ -117,7 +117,7 @@ fn rotations_that_cannot_follow_are_refused_by_name() {
                 + &format!(
                     "{wall}{FOLLOW}\n[constraint.wall]\ntype = 'fix'\nbody = 'wall'\nnodes = {{ set = 'x-max' }}\n"
                 ),
-            ["follows a solid, and `wall` acts on it, too", "components = [\"x\", \"y\", \"z\"]"],
+            ["follows a solid, but `wall` prescribes it, too", "components = [\"x\", \"y\", \"z\"]"],
         ),
         (
             plain.clone() + &wall.replace("model = 'shell'", "model = 'membrane'") + FOLLOW,
@@ -125,14 +125,14 @@ fn rotations_that_cannot_follow_are_refused_by_name() {
         ),
         (
             plain.replace("model = 'shell'", "model = 'membrane'"),
-            ["`strip` is no shell: its nodes have no rotations", "leave it out"],
+            ["`strip` is not a shell: its nodes have no rotations", "leave it out"],
         ),
         (
             plain
                 .replace("nodes = { set = 'x-min' }\nrotations", "tolerance = 1\nrotations")
                 .replace("['strip', 'block']", "['strip', 'plate']")
                 + "[body.plate]\nmodel = 'shell'\nmesh = { plate = { size = [0.02, 0.02], cells = [2, 2] }, at = [0, 0, 0.02] }\nlaw = 'strip'\ndensity = 1000\nthickness = 1e-3\n",
-            ["`plate` is no solid, and rotations follow solids alone", "leave it out"],
+            ["`plate` is not a solid, and rotations follow only solids", "leave it out"],
         ),
         (
             explicit,

@@ -244,7 +244,7 @@ fn what_encloses_nothing_is_refused_by_name() {
     let top = "faces = { half-space = { point = [0, 0, 0], normal = [0, 0, 1] } }\nby = 1e-5";
     for (model, solver, volume, more, pieces) in [
         ("membrane", "solver = 'explicit'", top, "", vec!["leave an opening at", "close"]),
-        ("membrane", "solver = 'explicit'", "by = -2e-4", "", vec!["encloses", "is to lose more"]),
+        ("membrane", "solver = 'explicit'", "by = -2e-4", "", vec!["encloses", "`by` removes more"]),
         ("membrane", "solver = 'explicit'", "", "", vec!["by"]),
         ("shell", "solver = 'explicit'", "by = 1e-5", "", vec!["explicit shells", "`balloon`"]),
         (

@@ -27,14 +27,14 @@ impl Context<'_> {
             scene.run.solver.solves_equations(),
         ) {
             let message = format!(
-                "`{shell}` is a shell and `{solid}` is not: they do not go together with the solver `{solver}`"
+                "`{shell}` is a shell and `{solid}` is not: the solver `{solver}` takes only one of both kinds"
             );
             let help = match &of_model(BodyModel::Shell).and_then(|(_, shell)| shell.on.as_ref()) {
                 Some(_) => {
-                    "a wall on a solid takes `model = \"membrane\"` with this solver, without bending, or the solver \"implicit\" or \"static\""
+                    "set `model = \"membrane\"`, without bending, or take `solver = \"implicit\"` or `\"static\"`"
                 }
                 None => {
-                    "take `solver = \"static\"` or `\"implicit\"`, or give the others a participant of their own"
+                    "take `solver = \"static\"` or `\"implicit\"`, or put the other bodies into a participant of their own"
                 }
             };
             self.error(&["body", shell, "model"], message, "not with this solver", help);
@@ -50,7 +50,7 @@ impl Context<'_> {
         };
         let on_gpu = scene.run.solver == SolverName::Explicit && scene.run.device == DeviceName::Gpu;
         if scene.run.precision == Some(PrecisionName::Single) && !on_gpu {
-            let message = format!("{what} are computed in double precision only on the CPU");
+            let message = format!("on the CPU, {what} use double precision only");
             self.error(&scene.run_at("precision"), message, "not for these bodies", "leave `precision` out");
         }
         if scene.run.checkpoint.is_some()
@@ -61,7 +61,7 @@ impl Context<'_> {
             self.error(&scene.run_at("checkpoint"), message, "not with `arc-length`", help);
         }
         if scene.run.mass_scaling.is_some() {
-            let message = format!("mass is not scaled for {what}");
+            let message = format!("`mass-scaling` is not available for {what}");
             let help = match scene.run.solver {
                 SolverName::Explicit => {
                     "leave it out, or take `solver = \"implicit\"`, which has no critical time step"
@@ -73,7 +73,8 @@ impl Context<'_> {
         }
         if scene.run.on_unstable.is_some() {
             let message = format!("the critical time step of {what} is not monitored");
-            let help = "leave it out; their step is compared with the critical one at rest before the run";
+            let help =
+                "leave it out: the step is compared with the critical time step at rest before the run";
             self.error(&scene.run_at("on-unstable"), message, "not for these bodies", help);
         }
     }
@@ -86,7 +87,7 @@ impl Context<'_> {
         if let Some((name, _)) = own.find(|(_, body)| body.stiffness_damping != table.stiffness_damping) {
             let message = format!("`{name}` and `{first}` have different `stiffness-damping`");
             let help = "bodies of a participant share one value";
-            self.error(&["body", name, "stiffness-damping"], message, "another", help);
+            self.error(&["body", name, "stiffness-damping"], message, "another value", help);
         }
         let solver = scene.run.solver;
         let (damps, wanted) = match (solver, is_implicit) {
@@ -166,7 +167,7 @@ impl Context<'_> {
                 (
                     "pre-tension",
                     shell && body.element != Some(Element::Plate),
-                    "a shell that resists in its plane",
+                    "a shell with stiffness in its plane",
                 ),
                 ("crease", shell, "a shell"),
                 ("normals", shell, "a shell"),
@@ -226,15 +227,14 @@ impl Context<'_> {
         if !increasing {
             let help =
                 "such as `load-steps = { times = [0.1, 0.2, 0.5] }`; the last load step ends with the scene";
-            self.error(&path, "times of load steps lie above 0 s and increase", "out of order", help);
+            self.error(&path, "times of load steps must be above 0 s and increase", "out of order", help);
         }
         if matches!(run.step, StepChoice::Seconds(_)) {
             let message = "the load steps are given in two ways, by `step` and by their times";
-            self.error(&path, message, "and by `step`", "leave one of them out");
+            self.error(&path, message, "also given by `step`", "leave one of them out");
         }
         if run.control.is_some() {
-            let message =
-                "`control` goes on by equal parts in each load step, and these end at times of their own";
+            let message = "`control` needs equal load steps, but these have times of their own";
             let help = "give their number, such as `load-steps = 10`";
             self.error(&path, message, "not with `control`", help);
         }

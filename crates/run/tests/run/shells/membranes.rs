@@ -51,7 +51,7 @@ pub(super) fn coarse_meshes_of_curved_walls_under_pressure_are_warned_about() {
         &output,
         &[
             "of `wall` under pressure have edges above 2 √(R t)",
-            "m is the limit",
+            "m, above its limit of",
             "take shorter edges or a regular mesh",
         ],
     );
@@ -111,7 +111,7 @@ pub(super) fn a_slack_membrane_is_told_and_starts() {
     says(&output, &["in `wall`", "a membrane resists bending and compression across by nothing"]);
     assert!(!output.words().contains("inf"), "{}", output.err);
     let plate = "thickness = 0.002\nelement = \"plate\"\npre-tension = 1";
-    refused(&[(THICK, plate)], &["`pre-tension` is for a shell that resists in its plane"]);
+    refused(&[(THICK, plate)], &["`pre-tension` is for a shell with stiffness in its plane"]);
 }
 
 /// A wall pulled by half its length gives a warning about large strain, with body, triangle and time; pulled

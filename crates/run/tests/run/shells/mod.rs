@@ -176,7 +176,7 @@ fn an_open_balloon_is_refused_with_its_borders() {
     let tube = "mesh = { cylinder = { radius = 0.05, length = 0.2, cells = [8, 4] } }";
     refused(
         &[(STEPS, control), (PLATE, tube), ("x-min", "z-min")],
-        &["2 open borders: 8 nodes (0,", "close the surface, or press on all of it"],
+        &["2 open borders: 8 nodes (0,", "close the surface, or apply the pressure to the whole surface"],
     );
 }
 
@@ -428,11 +428,14 @@ fn wrong_combinations_of_models_solvers_and_keys_are_refused() {
         (run("device = \"gpu\""), ["the solver `static` runs on the CPU only", "`solver = \"implicit\"`"]),
         (
             run("precision = \"single\""),
-            ["shells are computed in double precision only on the CPU", "leave `precision` out"],
+            ["on the CPU, shells use double precision only", "leave `precision` out"],
         ),
         (
             run("mass-scaling = { target-step = 1e-3 }"),
-            ["mass is not scaled for shells", "leave it out: the solver `static` has no critical time step"],
+            [
+                "`mass-scaling` is not available for shells",
+                "leave it out: the solver `static` has no critical time step",
+            ],
         ),
         (
             run("on-unstable = \"stop\""),

@@ -460,7 +460,7 @@ impl Meshed<'_> {
         }
         if let Some(stoutness) = notes.stoutness.filter(|&stoutness| stoutness > STOUT) {
             self.notes.push(format!(
-                "`{name}` is {stoutness:.2} times as thick as wide (width: twice its area over its border). Transverse shear is \
+                "`{name}` is {stoutness:.2} times as thick as wide (width: twice its area over its border): transverse shear is \
                  neglected, so a strip like this is about {:.0} % too stiff in torsion (0.63 times this ratio)",
                 63.0 * stoutness
             ));
@@ -515,7 +515,7 @@ impl Meshed<'_> {
             ModelError::Branch { .. } => {
                 ("mesh", "set `branches = true` if walls are meant to meet there, or repair the mesh")
             }
-            _ => ("mesh", "`pliant info` reads a mesh file on its own; `fix = \"merge\"` joins nodes"),
+            _ => ("mesh", "run `pliant info` on the mesh file for details; `fix = \"merge\"` joins nodes"),
         };
         self.error(&["body", name, key], error.to_string(), "here", help);
     }

@@ -293,7 +293,7 @@ impl Loaded<'_> {
         }
         if table.separate && table.gap.is_some() {
             let message =
-                "`gap` moves the same bodies apart at rest that `separate` moves apart at the start";
+                "`gap` and `separate` push the same bodies apart: `gap` at rest, `separate` at the start";
             self.error(&["contact", name, "gap"], message, "one too many", "leave one of them out");
             return false;
         }

@@ -98,12 +98,12 @@ impl Tied<'_> {
             let (what, help) = match key {
                 "force-limit" => (
                     "force",
-                    "take the solver `implicit` or `static`, or push with a tool, which can have a `force-limit` here",
+                    "take the solver `implicit` or `static`, or push with a tool that has a `force-limit`",
                 ),
                 _ => ("pressure", "take the solver `implicit` or `static`, or a load of type `pressure`"),
             };
             let solver = self.scene.run.solver.word();
-            let message = format!("the solver `{solver}` keeps no limit of the {what} of `{name}`");
+            let message = format!("the solver `{solver}` cannot limit the {what} of `{name}`");
             self.error(path, message, "not with this solver", help);
         }
         let number = self.assembly.constraints.len();
@@ -125,14 +125,13 @@ impl Tied<'_> {
                 continue;
             };
             let diagnostic = Diagnostic::error(format!(
-                "`{}` prescribes nodes that lag where the force of `{}` reaches its limit",
+                "`{}` prescribes nodes of `{}`, which lag behind where the force reaches its limit",
                 other.name, own.name
             ));
             let place = self.source().key_span(&["constraint", &other.name]);
             let limit = self.source().span(&["constraint", &own.name, "force-limit"]);
             let help = "take the shared nodes out of one of them with `{ difference = [ …, … ] }`, or limit `components`";
-            let diagnostic =
-                diagnostic.at(place, "has nodes of the other").also(limit, "this limit").help(help);
+            let diagnostic = diagnostic.at(place, "shares nodes").also(limit, "this limit").help(help);
             found.push(diagnostic);
         }
         self.out.extend(found);
@@ -156,13 +155,13 @@ impl Tied<'_> {
             let (body, node) = self.assembly.locate_node(node);
             let body = &self.bodies[body].name;
             let message = format!(
-                "the rotation of node {node} of `{body}` follows a solid, and `{name}` acts on it, too"
+                "the rotation of node {node} of `{body}` follows a solid, but `{name}` prescribes it, too"
             );
             let help = match encloses {
                 true => "leave `rotations` free, or fill a body of model `membrane`",
                 false => "limit it to translations: `components = [\"x\", \"y\", \"z\"]`",
             };
-            self.error(&["constraint", &name], message, "holds what follows", help);
+            self.error(&["constraint", &name], message, "prescribes a rotation", help);
         }
     }
 
@@ -173,7 +172,10 @@ impl Tied<'_> {
         let Some(body) = self.find_body(&table.body, &at("body")) else { return };
         let explicit = !self.scene.run.solver.solves_equations();
         if explicit && self.shell_cells(body).is_some() {
-            let message = format!("explicit shells fill no volume, and `{}` is a shell", table.body);
+            let message = format!(
+                "with the solver `explicit` no shell can enclose a volume, and `{}` is a shell",
+                table.body
+            );
             let help = "take the solver `implicit` or `static`, or a body of model `membrane`";
             self.error(&at("body"), message, "a shell in an explicit run", help);
             return;
@@ -185,7 +187,7 @@ impl Tied<'_> {
         let faces = self.faces(Subject::Body(body), selection, &at(key));
         let (Some(mut faces), Some(curve)) = (faces, self.course(&table.timing, &path)) else { return };
         if faces.is_empty() {
-            let message = format!("`{name}` has no faces, which would enclose a volume");
+            let message = format!("`{name}` has no faces that enclose a volume");
             let help = "take a body of model `solid`, `membrane` or `shell`";
             self.error(&at(key), message, "no faces", help);
             return;
@@ -226,13 +228,8 @@ impl Tied<'_> {
         }
         if table.by <= -volume.abs() {
             let message =
-                format!("`{name}` encloses {} m³ at rest, and is to lose more", number(volume.abs()));
-            self.error(
-                &at("by"),
-                message,
-                "less than nothing is left",
-                "take a change above minus that volume",
-            );
+                format!("`{name}` encloses {} m³ at rest, but `by` removes more", number(volume.abs()));
+            self.error(&at("by"), message, "no volume is left", "`by` must be above minus this volume");
             return;
         }
         if let Some(limit) = table.pressure_limit {
@@ -312,7 +309,7 @@ impl Tied<'_> {
             }
             (None, Some(velocity)) => Some(Motion::Velocity(velocity, curve?)),
             (None, None) if table.turn.is_some() => {
-                let message = "the nodes of a solid do not turn by themselves";
+                let message = "the nodes of a solid have no rotations";
                 self.error(
                     &[path, &["turn"]].concat(),
                     message,
@@ -348,7 +345,7 @@ impl Tied<'_> {
             ("components", table.components.is_some()),
         ];
         if let Some((key, _)) = others.iter().find(|(_, given)| *given) {
-            let message = format!("`rotate` prescribes all of a motion, `{key}` does not go with it");
+            let message = format!("`rotate` prescribes the whole motion, so `{key}` cannot be used with it");
             self.error(&[path, &[*key]].concat(), message, "not with `rotate`", "leave one of them out");
             return None;
         }

@@ -23,7 +23,7 @@ impl Tied<'_> {
             None => [true, true, true, rotates && turns, rotates && turns, rotates && turns],
             Some([]) => {
                 let at = [path, &["components"]].concat();
-                let help = "name x, y, z (of shells also rx, ry, rz), or leave it out for all";
+                let help = "name x, y, z (for shells also rx, ry, rz), or leave it out for all";
                 self.error(&at, "`components` is empty", "here", help);
                 return None;
             }
@@ -50,14 +50,14 @@ impl Tied<'_> {
         self.note_turns(&format!("constraint `{name}`: `turn`"), turn.norm());
         if table.rotate.is_some() {
             let message = "a rotation about an axis is for nodes of solids";
-            let help = "of shells `turn` turns the nodes about their own places; give their way node by node in `by`";
+            let help = "`turn` rotates the nodes of shells about their own places; give the path of each node in `by`";
             self.error(&[path[0], path[1], "rotate"], message, "not for this model", help);
             return None;
         }
         let shift = match (&table.by, table.velocity) {
             (_, Some(_)) => {
-                let message = "nodes of shells move by a way, not with a velocity";
-                let help = "give the whole way in `by`, with a `curve`";
+                let message = "nodes of shells take a displacement, not a velocity";
+                let help = "give the whole displacement in `by`, with a `curve`";
                 self.error(&[path[0], path[1], "velocity"], message, "not for this model", help);
                 return None;
             }

@@ -54,7 +54,7 @@ impl Tied<'_> {
     fn no_timing(&mut self, table: &LoadTable, path: &[&str]) -> Option<Curve> {
         let timing = table.timing();
         if timing.curve.is_some() || timing.from != 0.0 || timing.to.is_some() {
-            let message = "the factor of a controlled load is computed: it has no curve of its own";
+            let message = "a controlled load has no curve: the run computes its factor";
             self.error(path, message, "this load", "leave out `curve`, `from` and `to`");
             return None;
         }
@@ -119,7 +119,7 @@ impl Tied<'_> {
                 LoadKind::Forces(self.traction_forces(target, &faces, traction.traction))
             }
             _ => {
-                let message = "a carried surface takes forces and tractions";
+                let message = "a carried surface takes only forces and tractions";
                 self.error(&at("on"), message, "a carried surface", "load the body itself");
                 return None;
             }
@@ -216,7 +216,7 @@ impl Tied<'_> {
         };
         let message = format!("{message}: on a thin curved wall displacements scatter from node to node");
         let place = self.source().span(&[path, &["spread"]].concat());
-        self.out.push(Diagnostic::warning(message).at(place, "not of one surface").help(help));
+        self.out.push(Diagnostic::warning(message).at(place, "does not fit the element").help(help));
     }
 
     /// Says where a mesh is too coarse for pressure on a thin curved wall, or its normals are estimated.
@@ -224,16 +224,15 @@ impl Tied<'_> {
         let name = self.bodies[body].name.clone();
         if found.estimated > 0 {
             self.notes.push(format!(
-                "`{name}`: the normals of {} of {count} curved triangles under pressure are estimated from the triangles, which costs \
-                 accuracy on irregular meshes; meshes of `pliant mesh --as shells` and built-in shapes bring the normals of their \
-                 surface",
+                "`{name}`: the normals of {} of {count} curved triangles under pressure are estimated from the triangles, which is less \
+                 accurate on irregular meshes. Meshes of `pliant mesh --as shells` and built-in shapes have exact normals",
                 found.estimated
             ));
         }
         if found.coarse > 0 {
             let message = format!(
-                "{} of {count} of `{name}` under pressure have edges above 2 √(R t), with R the radius of curvature: the \
-                 worst is triangle {} (counted from 0) with {} m, where {} m is the limit",
+                "{} of {count} of `{name}` under pressure have edges above 2 √(R t), with R the radius of curvature and t the thickness: the worst is triangle {} \
+                 (counted from 0) with {} m, above its limit of {} m",
                 counted(found.coarse, "triangle"),
                 self.own_cell(body, found.worst),
                 number(found.edge),
@@ -291,7 +290,7 @@ impl Tied<'_> {
             _ => None,
         };
         if table.stop.is_some() && table.arc_length.is_none() {
-            let message = "`stop` is for `arc-length`: other controls end where they are set to end";
+            let message = "`stop` is for `arc-length`: other controls end at their own goal";
             self.error(&[&path[..], &["stop"]].concat(), message, "has no effect here", "remove it");
         }
         control
@@ -309,7 +308,7 @@ impl Tied<'_> {
         let (load_factor, limit_points) = (table.load_factor, table.limit_points);
         if load_factor.is_none() && displacement.is_none() && limit_points.is_none() {
             let message = "`stop` needs one of `load-factor`, `displacement` and `limit-points`";
-            self.error(&path[..3], message, "says nothing", "remove it to end at a load factor of 1");
+            self.error(&path[..3], message, "empty", "remove it to end at a load factor of 1");
             return None;
         }
         Some(Stop { load_factor, displacement, limit_points })
@@ -345,8 +344,8 @@ impl Tied<'_> {
         let scene = self.scene;
         let path = [&scene.run_at("control")[..], &["volume"]].concat();
         let Some(cells) = pressed else {
-            let message = format!("`{load}` is no pressure on a shell, which a volume is controlled by");
-            self.error(&path, message, "of what?", "let `load` name a pressure on a closed shell");
+            let message = format!("a volume needs a pressure on a closed shell, and `{load}` is not one");
+            self.error(&path, message, "no volume", "let `load` name a pressure on a closed shell");
             return None;
         };
         match self.assembly.check_closed(cells) {
@@ -355,8 +354,8 @@ impl Tied<'_> {
                 Some(RunControl::Volume { from, to })
             }
             Err(error) => {
-                let help = "close the surface, or press on all of it";
-                self.error(&path, error.to_string(), "of an open surface", help);
+                let help = "close the surface, or apply the pressure to the whole surface";
+                self.error(&path, error.to_string(), "an open surface", help);
                 None
             }
         }

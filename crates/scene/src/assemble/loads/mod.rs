@@ -70,7 +70,7 @@ impl Tied<'_> {
         let Some(wall) = wall.filter(|_| !of_nodes) else { return true };
         let name = self.bodies[wall].name.clone();
         let message =
-            format!("`{name}` has no nodes of its own: its weight is that of the body that it is on");
+            format!("`{name}` has no nodes of its own: its weight counts with the body that it lies on");
         self.error(path, message, "a wall", "name that body, or leave `on` out");
         false
     }

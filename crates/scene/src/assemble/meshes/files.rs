@@ -126,7 +126,7 @@ impl Context<'_> {
                 (MeshFileError::Open { .. }, _) => {
                     (error.to_string(), "file names are relative to the scene file")
                 }
-                _ => (error.to_string(), "`pliant info` reads a mesh file on its own"),
+                _ => (error.to_string(), "run `pliant info` on the file for details"),
             };
             MeshFault { key: "file", message, help: help.into() }
         })
@@ -138,7 +138,7 @@ impl Context<'_> {
             let known: Vec<String> = given.keys().map(|name| format!("`{name}`")).collect();
             let help = match known.is_empty() {
                 true => "the program that reads this scene gives no meshes; take a `file`".into(),
-                false => format!("it gives {}", known.join(", ")),
+                false => format!("the program gives {}", known.join(", ")),
             };
             MeshFault { key: "given", message: format!("no mesh `{name}` is given"), help }
         })

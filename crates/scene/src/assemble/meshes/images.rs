@@ -129,7 +129,7 @@ impl Context<'_> {
         let place = self.source().span(path);
         let doubt = |message: String| Diagnostic::warning(message).at(place.clone(), "this mesh");
         self.out.extend(kept.doubts.into_iter().map(doubt));
-        let whole = "if the organ goes on beyond the image, its mesh ends there with a flat face";
+        let whole = "if the organ extends beyond the image, its mesh ends there with a flat face";
         self.out.extend(scan.cut_off().into_iter().map(|message| doubt(message).help(whole)));
         let origin = format!("{name} ({format}), {}", recipe.words(&scan));
         let mut mesh = kept.mesh;
@@ -155,7 +155,7 @@ impl Context<'_> {
         let failed = |key, error: ImageError| {
             let help = match error {
                 ImageError::Open { .. } => "file names are relative to the scene file",
-                _ => "`pliant labels` reads an image on its own",
+                _ => "run `pliant labels` on the image for details",
             };
             MeshFault { key, message: error.to_string(), help: help.into() }
         };
@@ -222,8 +222,8 @@ fn choice(image: &mut Image, table: &MeshTable) -> Result<Choice, MeshFault> {
 fn with_vessels(mut image: Image, choice: &Choice, table: &MeshTable) -> Result<Image, MeshFault> {
     let Some(vessels) = &table.vessels else { return Ok(image) };
     let Choice::Labels(organ) = choice else {
-        let help = "name the organ by `label` or `labels`";
-        let message = "`vessels` run inside of labels, and this body is chosen by `threshold`".into();
+        let help = "select the organ by `label` or `labels`";
+        let message = "`vessels` lie inside of labels, but this body is chosen by `threshold`".into();
         return Err(MeshFault { key: "vessels", message, help: help.into() });
     };
     let all: Vec<LabelChoice> = vessels.iter().map(Label::choice).collect();
@@ -241,8 +241,12 @@ fn label_fault(key: &'static str, table: &MeshTable, error: &LabelError) -> Mesh
     let help = match error {
         LabelError::NoneChosen { .. } => "add `label = 1`, `labels = [1, 2]`, or `threshold = 0.5`",
         LabelError::NotWhole { .. } => "`threshold = 0.5` takes a map of probabilities",
-        LabelError::Grey { .. } => "`threshold` takes all voxels from a value on, as 200 for bone in a CT",
-        LabelError::NoMask { .. } => "`threshold = 0.5` takes the voxels of each mask from this value on",
+        LabelError::Grey { .. } => {
+            "`threshold` takes all voxels with at least this value, such as 200 for bone in a CT"
+        }
+        LabelError::NoMask { .. } => {
+            "`threshold = 0.5` takes the voxels of each mask with at least this value"
+        }
         LabelError::NoSuchName { .. } | LabelError::AmbiguousName { .. } => {
             "`names = \"table.txt\"` gives the labels names; `pliant labels` lists them"
         }
@@ -320,12 +324,12 @@ fn recipe(table: &MeshTable) -> Result<Recipe, MeshFault> {
         return refuse(
             "fix",
             "`fix` repairs the cells of a mesh file",
-            "`clean` cleans the input of new cells",
+            "leave it out: `clean` cleans an image or a surface before new cells are made",
         );
     }
     if table.file.is_some() {
         if table.clean.is_some() && !matches!(cells, Goal::Volume(..)) {
-            let help = "leave it out: a surface is mended, and stays as it is otherwise";
+            let help = "leave it out: Pliant repairs the surface and changes nothing else";
             return refuse("clean", "`clean` is for tets and hexes in the surface of a file", help);
         }
         return Ok(Recipe { cleaning, cells });
@@ -344,7 +348,7 @@ fn require_one_cut(table: &MeshTable) -> Result<(), MeshFault> {
         [table.label.is_some(), table.labels.is_some(), table.threshold.is_some() && table.masks.is_none()];
     match &table.masks {
         Some(masks) if masks.is_empty() => {
-            return refuse("masks", "`masks` names no image", "name one at least");
+            return refuse("masks", "`masks` names no image", "name at least one");
         }
         Some(masks) if masks.len() > 1000 => {
             return refuse("masks", "`masks` names more than 1000 images", "mesh them in parts");
@@ -352,7 +356,7 @@ fn require_one_cut(table: &MeshTable) -> Result<(), MeshFault> {
         _ => {}
     }
     if ways.iter().filter(|way| **way).count() > 1 {
-        let message = "an image is cut out by exactly one of `label`, `labels`, `threshold`";
+        let message = "exactly one of `label`, `labels` and `threshold` selects the body in an image";
         return refuse(
             if table.image.is_some() { "image" } else { "masks" },
             message,
@@ -396,7 +400,7 @@ fn goal(table: &MeshTable) -> Result<Goal, MeshFault> {
     ];
     if let Some((key, _)) = of_tets.into_iter().find(|(_, given)| *given && cells != Cells::Tets) {
         let message = format!("`{key}` does not go with {words}");
-        return Err(MeshFault { key, message, help: "it is for tets".into() });
+        return Err(MeshFault { key, message, help: "leave it out: it is for tets".into() });
     }
     let source = match (&table.file, &table.masks) {
         (Some(_), _) => "file",
@@ -405,9 +409,9 @@ fn goal(table: &MeshTable) -> Result<Goal, MeshFault> {
     };
     if let Some(key) = given.iter().copied().find(|key| !fitting.contains(key)) {
         let help = match cells {
-            Cells::Shells => "shells are as many as `shells`, or as close as `error`",
-            Cells::Surface => "a surface has even triangles of `edge`, or as few as `triangles`",
-            _ => "their size is `edge`, in metres",
+            Cells::Shells => "give the number of `shells`, or their largest `error`",
+            Cells::Surface => "give `edge` for even triangles, or their number in `triangles`",
+            _ => "give their size in `edge`, in metres",
         };
         return Err(MeshFault {
             key,
@@ -499,7 +503,7 @@ impl Recipe {
 
     fn words(&self, scan: &Scan) -> String {
         let cut = match scan {
-            Scan::Surface(_) => "what it encloses".into(),
+            Scan::Surface(_) => "its interior".into(),
             Scan::Image(_, Choice::From(least)) => format!("from {least} on"),
             Scan::Image(image, Choice::Labels(labels)) => {
                 let shown = labels.iter().map(|&label| image.names.shown(label));
@@ -510,7 +514,7 @@ impl Recipe {
             Goal::Volume(cells, fineness) => format!("{} {}", words(*cells), fineness.words()),
             Goal::Even(edge) => format!("surface in triangles of {edge} m"),
             Goal::Triangles(number) => format!("surface in {number} triangles"),
-            Goal::Finest => "surface as fine as it is given".into(),
+            Goal::Finest => "surface at full resolution".into(),
             Goal::Shells(ShellGoal::Shells(number)) => format!("{number} shells"),
             Goal::Shells(ShellGoal::Error(error)) => format!("shells within {} %", 100.0 * error),
         };

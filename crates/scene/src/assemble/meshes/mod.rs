@@ -108,7 +108,7 @@ impl Context<'_> {
     /// A mesh with cells of its own, in metres.
     pub(super) fn with_own_cells(&mut self, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
         if table.edge.is_some() {
-            let message = "a mesh file has its own cells, whose `edge` is not for choosing";
+            let message = "a mesh file has its own cells, so `edge` has no effect";
             let help = "leave it out, or add `as = \"tets\"` to make new cells in the surface of the file";
             self.error(&[path, &["edge"]].concat(), message, "here", help);
             return None;
@@ -148,9 +148,8 @@ impl Context<'_> {
         let cells = table.made_of();
         let structured = matches!(source, "block" | "tube");
         if matches!(cells, Cells::Surface | Cells::Shells) || structured && cells == Cells::ImmersedHexes {
-            let message = format!("`{source}` is not made of {}", words(cells));
-            let help =
-                "tets and hexes fit the faces of blocks and tubes; surfaces and shells are made of images";
+            let message = format!("`{source}` cannot be made of {}", words(cells));
+            let help = "take tets or hexes, which fit the faces of blocks and tubes; surfaces and shells come from images";
             self.error(
                 &at("as"),
                 message,
@@ -248,7 +247,7 @@ impl Context<'_> {
             self.doubt_size(mesh, table, path);
             let met = faces_met_by_two_tets(mesh);
             if met > 0 {
-                let message = format!("`{}` has {} that two tets meet", path[1], counted(met, "hex face"));
+                let message = format!("`{}` has {} that meet two tets", path[1], counted(met, "hex face"));
                 let help = "stresses are wrong there, since such faces fail the patch test: make the body of one kind of cells";
                 let place = self.source().span(&place);
                 self.out.push(Diagnostic::warning(message).at(place, "this mesh").help(help));
@@ -303,7 +302,7 @@ fn problems(found: &Diagnosis, fixes: &[Fix], dimension: usize) -> Vec<(String, 
         ("inverted elements at rest", list_cells(&inverted), reorder),
         (
             [
-                "bars of no length at rest",
+                "bars without length at rest",
                 "triangles without area at rest",
                 "elements without volume at rest",
             ][dimension - 1],
@@ -322,7 +321,7 @@ fn problems(found: &Diagnosis, fixes: &[Fix], dimension: usize) -> Vec<(String, 
         ),
         ("elements that repeat another", list_cells(&repeats), "remove them from the mesh file"),
         (
-            "faces of more than two elements, by their nodes",
+            "faces of more than two elements (by the numbers of their nodes)",
             shorten(crowded.into_iter()),
             "elements overlap there: remesh",
         ),
@@ -535,10 +534,10 @@ mod tests {
             ("{ organ = 'liver', edge = 1, names = 'a.txt' }", "`names` is for images"),
             ("{ organ = 'liver', edge = 1, vessels = [1] }", "`vessels` is for images"),
             ("{ organ = 'liver', edge = 1, error = 0.1 }", "`error` is for images"),
-            ("{ organ = 'liver', edge = 1, as = 'shells' }", "`organ` is not made of shells"),
+            ("{ organ = 'liver', edge = 1, as = 'shells' }", "`organ` cannot be made of shells"),
             (
                 "{ block = { size = [1, 1, 1] }, edge = 1, as = 'immersed-hexes' }",
-                "not made of immersed hexes",
+                "cannot be made of immersed hexes",
             ),
         ] {
             let own = CUBE.lines().find(|line| line.starts_with("mesh")).unwrap();

@@ -26,9 +26,9 @@ const CROWDED: f64 = 1e-3;
 
 /// The complaint about a bar that shall hold another body.
 pub(crate) fn holds_nothing(source: &Source, path: &[&str], host: &str) -> Diagnostic {
-    Diagnostic::error(format!("`{host}` is a bar, which holds no other body"))
+    Diagnostic::error(format!("`{host}` is a bar, and no other body can be tied to a bar"))
         .at(source.span(path), "a bar")
-        .help("name it first: its nodes follow the other body")
+        .help("name it first, so that its nodes follow the other body")
 }
 
 /// The second phase: bodies that are tied to each other, with the surfaces that they carry.
@@ -123,7 +123,7 @@ impl Meshed<'_> {
         }
         if self.shell_cells(guest).is_some() && !follow {
             let remedy = match self.shell_cells(host) {
-                Some(_) => "shells that shall keep their angle have common nodes, in one mesh",
+                Some(_) => "to keep the angle, give both shells common nodes in one mesh",
                 None => "`rotations = \"follow\"` turns it with a solid",
             };
             self.notes.push(format!(
@@ -178,7 +178,7 @@ impl Meshed<'_> {
         let (wall, solid) = (volume(guest, true) + shells, volume(host, false));
         if solid > 0.0 && wall > CROWDED * solid {
             self.notes.push(format!(
-                "the wall of `{}` takes {} % of the volume of `{}`, which is stiff and heavy there, too",
+                "the wall of `{}` fills {} % of the volume of `{}`: there the stiffness and mass of both count",
                 names[0],
                 number(100.0 * wall / solid),
                 names[1]

@@ -77,7 +77,7 @@ impl Meshed<'_> {
             let message = format!("`{wall}` is a {model}, and `mortar` joins faces of solids");
             return Err(Refusal {
                 message,
-                label: "not of these bodies",
+                label: "not for these bodies",
                 help: "take `method = \"points\"`",
             });
         }
@@ -104,12 +104,12 @@ impl Meshed<'_> {
             && let Some((other, _)) = self.scene.ties.iter().find(has_other)
         {
             let message = format!(
-                "faces of `{}` reach beyond `{}`, to nodes that `{other}` may tie, and mortar rows of two ties share no face",
+                "faces of `{}` reach beyond `{}` to nodes that `{other}` may tie, and two mortar ties cannot share a face",
                 names[0], names[1]
             );
             let help =
                 "take `method = \"points\"`, or a mesh with nodes where the faces of the other body end";
-            return Err(Refusal { message, label: "on common faces", help });
+            return Err(Refusal { message, label: "shared faces", help });
         }
         Ok(found)
     }
@@ -146,7 +146,7 @@ impl Meshed<'_> {
         let left = self.left_out(joint, points, &found);
         if let (Some(&node), true) = (left.first(), table.nodes.is_some()) {
             let message = format!(
-                "{} of {} selected nodes of `{}` are on no face that lies on `{}`, such as that at {}",
+                "{} of {} selected nodes of `{}` are on no face that lies on `{}`, for example at {}",
                 left.len(),
                 points.nodes.len(),
                 names[0],
@@ -159,7 +159,7 @@ impl Meshed<'_> {
         } else if let Some(&node) = left.first() {
             let place = in_metres(self.assembly.rest[node as usize]);
             self.notes.push(format!(
-                "`{name}`: {} of {} nodes of `{}` near `{}` stay free, since no face of theirs lies on it, such as that at {place}",
+                "`{name}`: {} of {} nodes of `{}` near `{}` stay free, for example at {place}: none of their faces lies on it",
                 left.len(),
                 points.nodes.len(),
                 names[0],

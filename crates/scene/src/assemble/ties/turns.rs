@@ -12,12 +12,12 @@ impl Meshed<'_> {
     pub(super) fn can_turn(&mut self, name: &str, [guest, host]: [usize; 2], names: &[String; 2]) -> bool {
         let path = ["tie", name, "rotations"];
         if self.shell_cells(guest).is_none() {
-            let message = format!("`{}` is no shell: its nodes have no rotations", names[0]);
+            let message = format!("`{}` is not a shell: its nodes have no rotations", names[0]);
             self.error(&path, message, "nothing turns", "leave it out");
             return false;
         }
         if self.bodies[host].mesh.volume_blocks().all(|block| block.is_empty()) {
-            let message = format!("`{}` is no solid, and rotations follow solids alone", names[1]);
+            let message = format!("`{}` is not a solid, and rotations follow only solids", names[1]);
             let help = "leave it out; shells of one mesh, or with common nodes, turn together";
             self.error(&path, message, "not a solid", help);
             return false;
