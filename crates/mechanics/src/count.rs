@@ -44,7 +44,11 @@ impl Count for usize {
 /// If the value is no count, or too large to continue counting from.
 pub fn read<'de, D: Deserializer<'de>, C: Count + Deserialize<'de>>(from: D) -> Result<C, D::Error> {
     let count = C::deserialize(from)?;
-    if count.can_go_on() { Ok(count) } else { Err(D::Error::custom("a count that no run reaches")) }
+    if count.can_go_on() {
+        Ok(count)
+    } else {
+        Err(D::Error::custom("this count is larger than any run can reach"))
+    }
 }
 
 /// True if a time [s] can occur in a run: it is not before the start, and steps of a length [s] still change

@@ -51,7 +51,7 @@ impl<const N: usize> Point<N> {
 
 /// The equation could not be solved.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("Laplace's equation is not solved: residual {residual:.1e} after {iterations} iterations")]
+#[error("Laplace's equation could not be solved: residual {residual:.1e} after {iterations} iterations")]
 pub struct NotSolved {
     /// Relative residual.
     pub residual: f64,

@@ -102,7 +102,7 @@ pub enum PronyError {
     },
     /// No stress would be left after relaxing.
     #[error(
-        "the {part:?} weights sum to {sum}; they must sum to less than 1, or nothing is left to hold the tissue"
+        "the {part:?} weights sum to {sum}; they must sum to less than 1, because the tissue needs some stress that stays"
     )]
     Sum {
         /// The part.

@@ -55,7 +55,7 @@ pub enum TieError {
     },
     /// A followed node follows others, or itself.
     #[error(
-        "node {node} of `{body}` would follow nodes that follow others by `{other}`: ties make no chains and no circles"
+        "node {node} of `{body}` would follow nodes that follow others by `{other}`: ties cannot form chains or circles"
     )]
     Chain {
         /// The node, numbered in its body.

@@ -16,7 +16,7 @@ use crate::assemble::{Meet, overlaps, told_distance, told_overlap, usual_distanc
 use crate::world::World;
 
 /// Help text: bodies of two participants that can touch.
-const HOW: &str = "a solid with `explicit` steps on the CPU and bodies with `implicit` ones touch each other; or put both bodies into one participant";
+const HOW: &str = "take a solid with `explicit` steps on the CPU and a body with `implicit` ones, or put both bodies into one participant";
 
 /// Reason why bodies of two participants cannot touch.
 struct Mistake {
@@ -91,7 +91,7 @@ impl World {
         if self.is_behind(sides) {
             surface.faces.iter_mut().for_each(|face| face.swap(1, 2));
             notes.push(format!(
-                "contact `{name}`: `{}` touches by its nearer side, which its normals point away from",
+                "contact `{name}`: `{}` touches with its nearer side, although its normals point the other way",
                 table.between[other.side]
             ));
         }
@@ -117,21 +117,22 @@ impl World {
         let solvers = sides.map(|(part, _)| self.participants[part].scene.run.solver);
         if solvers != [SolverName::Explicit, SolverName::Implicit] {
             let [first, second] = &table.between;
-            let message =
-                format!("`{first}` and `{second}` are of two participants that cannot touch each other");
+            let message = format!(
+                "`{first}` and `{second}` belong to two participants whose solvers cannot share a contact"
+            );
             return Err(Mistake { message, label: "two participants", help: HOW });
         }
         if sides.iter().any(|(_, meet)| meet.surface.faces.is_empty()) {
             return Err(Mistake {
-                message: "bodies of two participants touch each other by faces, and bars have none".into(),
+                message: "contact between participants needs faces, and bars have no faces".into(),
                 label: "no faces",
-                help: "name the solid beside it, or let it touch obstacles and tools only",
+                help: "name a solid next to the bar, or let the bar touch obstacles and tools only",
             });
         }
         if !self.ties.is_empty() {
             return Err(Mistake {
-                message: "participants are tied to each other or touch each other, not both".into(),
-                label: "beside a tie",
+                message: "participants can be tied to each other or touch each other, but not both".into(),
+                label: "next to a tie",
                 help: "put bodies that are tied into one participant",
             });
         }
@@ -238,13 +239,13 @@ impl World {
             let mut names = names.filter(|name| of.built.meets.iter().any(|meet| meet.contact == **name));
             let Some(name) = names.next() else { continue };
             let message = format!(
-                "participant `{}` has steps of {} s, and another one has longer ones: its contact with `{}` needs the longest",
+                "participant `{}` has steps of {} s, but its contact with `{}` needs the longest step of all participants",
                 of.name,
                 number(of.plan.steps.step),
                 self.participants[set.host].name
             );
             let place = self.scene.source.span(&["contact", name, "between"]);
-            let help = "give implicit participants the same `step`, longer than that of explicit ones";
+            let help = "give all implicit participants the same `step`, longer than the explicit steps";
             out.push(Diagnostic::error(message).at(place, "shorter steps").help(help));
         }
     }

@@ -33,14 +33,14 @@ impl World {
                 continue;
             }
             if table.rotations == Rotations::Follow {
-                let message = format!("the springs of `{name}`, between participants, hold places alone");
+                let message = format!("`{name}` ties two participants by springs, which hold places only");
                 let help = "leave `rotations` out, or put both bodies into one participant with the solver `implicit` or `static`";
                 let place = source.span(&["tie", name, "rotations"]);
                 out.push(Diagnostic::error(message).at(place, "two participants").help(help));
                 continue;
             }
             if table.method == Some(TieMethod::Mortar) {
-                let message = format!("the springs of `{name}`, between participants, hold points");
+                let message = format!("`{name}` ties two participants by springs, which act at points");
                 let help = "leave `method` out, or put both bodies into one participant";
                 let place = source.span(&["tie", name, "method"]);
                 out.push(Diagnostic::error(message).at(place, "two participants").help(help));
@@ -83,8 +83,7 @@ impl World {
         for tie in &self.ties {
             if let Err(failure) = tie.slower(&parts) {
                 let place = self.scene.source.span(&["tie", &tie.name, "between"]);
-                let help = "put both bodies into one participant: shells and solids go together with `solver = \"implicit\"` or \
-                            `\"static\"`, membranes and solids with each solver";
+                let help = "put both bodies into one participant: `solver = \"implicit\"` or `\"static\"` takes shells and solids, and every solver takes membranes and solids";
                 out.push(Diagnostic::error(failure.message).at(place, "of two participants").help(help));
             }
         }

@@ -98,7 +98,7 @@ pub fn plan(scene: &Scene, built: &Built) -> Result<Plan, SceneErrors> {
         let [asked, until, step] = [asked, scene.scene.until, plan.steps.step].map(number);
         let steps = counted(plan.steps.number as usize, "step");
         let message = format!(
-            "a step of {asked} s does not divide the {until} s of the scene: it takes {steps} of {step} s"
+            "a step of {asked} s does not divide the {until} s of the scene: the run takes {steps} of {step} s"
         );
         plan.note = Some(plan.note.map_or(message.clone(), |note| format!("{note}; {message}")));
     }

@@ -48,7 +48,7 @@ impl Target {
                 None => Self::gpu(scene, built),
                 Some((key, what, help)) => {
                     let error = Diagnostic::error(format!("{what} runs on the CPU only"))
-                        .at(scene.source.span(&scene.run_at("device")), "not for this")
+                        .at(scene.source.span(&scene.run_at("device")), "not on a GPU")
                         .also(scene.source.span(&scene.run_at(key)), "requested here");
                     Err(Box::new(error.help(help)))
                 }
@@ -87,7 +87,7 @@ impl Target {
     #[cfg(not(feature = "gpu"))]
     fn gpu(scene: &Scene, _built: &Built) -> Result<Self, Box<Diagnostic>> {
         let place = scene.source.span(&scene.run_at("device"));
-        let help = "set `device = \"cpu\"`, or build it with the feature `gpu`";
+        let help = "set `device = \"cpu\"`, or build Pliant with the feature `gpu`";
         Err(Box::new(Diagnostic::error(WITHOUT).at(place, "not in this build").help(help)))
     }
 
@@ -108,13 +108,13 @@ impl Target {
                 let note = Some(format!("{what} on `{}`", device.adapter().name));
                 Self::on(device, run, note)
             }
-            Err(error) => Self::processor(run, Some(format!("{error}: it runs on the CPU"))),
+            Err(error) => Self::processor(run, Some(format!("{error}: the scene runs on the CPU"))),
         })
     }
 
     #[cfg(not(feature = "gpu"))]
     fn best(scene: &Scene, _built: &Built) -> Result<Self, Box<Diagnostic>> {
-        Ok(Self::processor(&scene.run, Some(format!("{WITHOUT}: it runs on the CPU"))))
+        Ok(Self::processor(&scene.run, Some(format!("{WITHOUT}: the scene runs on the CPU"))))
     }
 
     /// Explicit steps in single precision; equations, whose device works for a state in double precision.
@@ -190,8 +190,7 @@ fn key_of_gpu(run: &RunTable) -> Option<&'static str> {
 fn with_design(scene: &Scene, built: &Built) -> Result<(), Box<Diagnostic>> {
     let place = scene.source.span(&scene.run_at("design"));
     if scene.run.design.is_some() && built.implicit.is_some() {
-        let message =
-            "`design` is given, but it is about explicit solids, and these are shells or solved equations";
+        let message = "`design` is for explicit solids, but this run has shells or solves equations";
         return Err(Box::new(Diagnostic::error(message).at(place, "not used").help("leave `design` out")));
     }
     let Some(design @ Design::Blocks) = scene.run.design.map(design) else { return Ok(()) };

@@ -128,7 +128,7 @@ impl World {
 
 /// Help text: names and numbers that a view accepts.
 const NAMED: &str =
-    "labels of elements by number, name or range, and bodies, obstacles and tools by name can be given";
+    "give labels of elements by number, name or range; give bodies, obstacles and tools by name";
 
 #[cfg(test)]
 mod tests {

@@ -105,7 +105,7 @@ impl World {
             return Ok(());
         };
         let place = self.scene.source.span(&part.scene.run_at("load-steps"));
-        let message = "participants of a scene meet at equal times, and these load steps are unequal";
+        let message = "participants need equal load steps, and these load steps are unequal";
         let help = "give a number of load steps, or run the bodies in scenes of their own";
         let diagnostic = Diagnostic::error(message).at(place, "unequal").help(help);
         Err(self.scene.source.errors(vec![diagnostic]))

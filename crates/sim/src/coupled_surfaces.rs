@@ -151,7 +151,8 @@ impl Meetings {
         for set in sets {
             set.check(parts)?;
             if ratios[set.of] != 1 {
-                return Err(set.refused(parts, "has shorter steps than another one: give it the longest"));
+                return Err(set
+                    .refused(parts, "has shorter steps than another participant: give it the longest step"));
             }
             let (host, of) = (&parts[set.host], &parts[set.of]);
             let at_host = counts[set.host]..counts[set.host] + set.nodes.len();
@@ -163,7 +164,7 @@ impl Meetings {
             if areas.iter().any(|&area| unit * area <= 0.0) {
                 return Err(set.refused(
                     parts,
-                    "has guests without a face, or its host has no surface that they touch",
+                    "has contact nodes without a face, or the other participant has no surface that they touch",
                 ));
             }
             places.push(Places { all: coupled_nodes.len()..coupled_nodes.len() + set.nodes.len(), at_host });
@@ -180,7 +181,7 @@ impl Meetings {
             let awaited = part.method.contacts().map_or(0, |contacts| contacts.coupled_nodes.len());
             if awaited != count {
                 return Err(Failure::input(&format_args!(
-                    "contacts of participant `{}` have {awaited} guests, and the world has {count}",
+                    "contacts of participant `{}` expect {awaited} nodes of other participants, but the world has {count}",
                     part.name
                 )));
             }
@@ -349,25 +350,31 @@ impl CoupledSurface {
     /// If one is not explicit on the CPU, the other one not implicit, or nodes are not theirs.
     pub fn check(&self, parts: &[Part]) -> Result<(), Failure> {
         let [Some(host), Some(of)] = [self.host, self.of].map(|part| parts.get(part)) else {
-            return Err(Failure::input(&"guests name a participant that there is not"));
+            return Err(Failure::input(
+                &"a contact between participants names a participant that does not exist",
+            ));
         };
         match &host.method {
             #[cfg(feature = "gpu")]
             Method::Explicit(settings) if settings.device.is_some() => {
-                return Err(self.refused(parts, "meets one that is on a GPU, which knows no guests"));
+                return Err(self.refused(
+                    parts,
+                    "touches a participant on a GPU, which has no contact between participants",
+                ));
             }
             Method::Explicit(_) => {}
             _ => {
-                return Err(
-                    self.refused(parts, "meets one that is not explicit: one of two takes explicit steps")
-                );
+                return Err(self.refused(
+                    parts,
+                    "touches a participant that is not explicit: one of the two must take explicit steps",
+                ));
             }
         }
         if !of.method.solves_steps() {
-            return Err(self.refused(parts, "is not implicit: the other one of two solves its steps"));
+            return Err(self.refused(parts, "is not implicit: one of the two must take implicit steps"));
         }
         if self.nodes.iter().any(|&node| node as usize >= of.model.node_count()) {
-            return Err(self.refused(parts, "has fewer nodes than its guests"));
+            return Err(self.refused(parts, "has fewer nodes than the contact names"));
         }
         Ok(())
     }

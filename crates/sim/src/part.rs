@@ -193,7 +193,7 @@ impl Part {
     /// If it has not.
     pub(crate) fn has_room(&self) -> Result<(), Failure> {
         room_for(self.bytes()).map_err(|error| {
-            let message = format!("there is no room for the solver: {error}; use a coarser mesh");
+            let message = format!("not enough memory for the solver: {error}; use a coarser mesh");
             Failure::new(FailureKind::Memory, message, None)
         })
     }

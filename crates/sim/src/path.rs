@@ -39,7 +39,10 @@ impl Path {
     pub(crate) fn end(&self, stop: &Stop, state: &State, model: &Assembly) -> Option<String> {
         let limit = number(stop.load_factor.unwrap_or(f64::INFINITY));
         if stop.load_factor.is_some_and(|limit| self.factor.abs() >= limit) {
-            return Some(format!("the load factor is {}, at least {limit} in size", number(self.factor)));
+            return Some(format!(
+                "the load factor is {} and has reached the limit of ±{limit}",
+                number(self.factor)
+            ));
         }
         if let Some((node, component, by)) = stop.displacement {
             let moved = state.displacement(model, node as usize)[component];

@@ -337,7 +337,7 @@ impl PenaltyTie {
         let refused = |why: String| Failure::input(&format_args!("tie `{}`: {why}", self.name));
         let [a, b] = self.parts;
         if a == b || a.max(b) >= parts.len() || self.points[0].len() != self.points[1].len() {
-            return Err(refused("it needs as many points of one participant as of another".into()));
+            return Err(refused("it needs the same number of points in both participants".into()));
         }
         let both = [&parts[a], &parts[b]];
         for part in both {
@@ -386,7 +386,7 @@ impl Method {
             }
             #[cfg(feature = "gpu")]
             Self::Explicit(settings) if settings.device.is_some() => {
-                Some("is on a GPU, which ties to others do not reach")
+                Some("is on a GPU, where it cannot be tied to other participants")
             }
             _ => None,
         }

@@ -125,7 +125,7 @@ impl<R: Numeric> Solids<R> {
     pub(crate) fn new(part: &Part, state: State<R>) -> Result<Self, Failure> {
         if let Some(load) = part.model.loads.iter().find(|load| load.is_for_shells()) {
             return Err(Failure::input(&format_args!(
-                "`{}` is a load of shells, and solids don't take it",
+                "`{}` is a load of shells, and solids cannot take it",
                 load.name
             )));
         }

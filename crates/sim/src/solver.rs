@@ -181,7 +181,9 @@ pub(crate) fn on_cpu<R: Scalar>(part: &Part) -> Result<Box<dyn Solver<R>>, Failu
             })
         }
         Method::ExplicitShells(..) | Method::Static(..) | Method::Implicit(..) => {
-            return Err(Failure::input(&"shells and solved equations have a participant of their own"));
+            return Err(Failure::input(
+                &"shells, and solids with the solver `static` or `implicit`, need a participant of their own",
+            ));
         }
     })
 }

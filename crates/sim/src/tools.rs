@@ -145,7 +145,7 @@ impl Simulation {
             let Some(leg) = ways.reduce(|leg, before| leg.or(&before)) else { continue };
             if !(leg.is_finite() && within.is_finite()) {
                 return Err(Failure::input(&format_args!(
-                    "a number of the goal of `{tool}`, or the time to it, is not finite"
+                    "the goal of tool `{tool}`, or the time to reach it, is not finite"
                 )));
             }
             self.lead_part(index, number, leg);
@@ -156,7 +156,7 @@ impl Simulation {
             let mut known: Vec<&str> = rigids.flat_map(|all| &all.rigids).map(Rigid::tool).collect();
             known.dedup();
             Failure::input(&match known.is_empty() {
-                true => format!("there is no tool `{tool}`: nothing touches one"),
+                true => format!("there is no tool `{tool}`: no body touches a tool"),
                 false => format!("there is no tool `{tool}`; there are {}", known.join(", ")),
             })
         })

@@ -187,5 +187,5 @@ fn solvers_without_common_steps_are_refused() {
     let message = tie(vec![explicit.clone(), still]);
     assert!(message.contains("tie `glue`: participant `b` finds equilibria"), "{message}");
     let message = tie(vec![explicit]);
-    assert!(message.contains("as many points of one participant as of another"), "{message}");
+    assert!(message.contains("the same number of points in both participants"), "{message}");
 }

@@ -290,8 +290,8 @@ fn models_and_solvers_without_room_are_an_error() {
                  mesh = { block = { size = [0.1, 0.1, 0.1], cells = [40, 40, 40] } }\nlaw = 'tissue'\ndensity = 1000\n\
                  [constraint.base]\ntype = 'fix'\nbody = 'block'\nnodes = { set = 'x-min' }\n";
     for (scene, code, kind, says) in [
-        (wall, 2, "input", "there is no room for the model of `wall`: 2.9 GB of memory are needed"),
-        (block, 1, "memory", "there is no room for the solver: 1.2 GB of memory are needed"),
+        (wall, 2, "input", "not enough memory for the model of `wall`: 2.9 GB of memory are needed"),
+        (block, 1, "memory", "not enough memory for the solver: 1.2 GB of memory are needed"),
     ] {
         let workshop = Workshop::new(scene);
         let program = env!("CARGO_BIN_EXE_pliant");

@@ -48,5 +48,5 @@ fn without_an_adapter_the_packages_are_named_and_auto_runs_on_the_processor() {
     let ran = without_adapters(&on("device = \"auto\""), &["run", "case", "--json", "--step", "1e-3"]);
     let json = ran.done();
     assert_eq!((&json["device"], &json["precision"]), (&"cpu".into(), &"double".into()));
-    assert!(ran.words().contains("it runs on the CPU"), "{}", ran.err);
+    assert!(ran.words().contains("the scene runs on the CPU"), "{}", ran.err);
 }

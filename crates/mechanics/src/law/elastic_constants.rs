@@ -54,7 +54,10 @@ impl ElasticConstants {
                 poisson_ratio: None,
             } => {
                 if 3.0 * bulk <= 2.0 * shear * 1e-9 {
-                    return Err(error("bulk-modulus", format!("`bulk-modulus` {bulk} Pa is negligible")));
+                    return Err(error(
+                        "bulk-modulus",
+                        format!("`bulk-modulus` {bulk} Pa is negligible against the shear modulus"),
+                    ));
                 }
                 Ok(SmallStrainModuli { shear, bulk })
             }

@@ -250,7 +250,7 @@ fn equations_that_a_device_does_not_solve_are_refused_by_name() {
     let output = tube("device = \"gpu\"\ndesign = \"gather\"").check(&[]);
     assert_eq!(output.status(), "invalid", "{}", output.err);
     assert!(
-        output.underlines("design = \"gather\"") && output.words().contains("about explicit solids"),
+        output.underlines("design = \"gather\"") && output.words().contains("for explicit solids"),
         "{}",
         output.err
     );

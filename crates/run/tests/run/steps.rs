@@ -333,7 +333,8 @@ fn load_steps_that_are_not_as_asked_or_not_equal_are_told() {
         (output.err.clone(), workshop.read("out/case/summary.md"), output.done())
     };
     let (said, page, json) = run("step = 0.3");
-    let note = "a step of 0.3000 s does not divide the 1.000 s of the scene: it takes 4 steps of 0.2500 s";
+    let note =
+        "a step of 0.3000 s does not divide the 1.000 s of the scene: the run takes 4 steps of 0.2500 s";
     assert!(said.contains(note) && page.contains(note), "{said}\n{page}");
     assert_eq!((&json["step"], &json["steps"]), (&0.25.into(), &4.into()));
     let (said, page, unequal) = run("load-steps = { times = [0.1, 0.4] }");

@@ -170,7 +170,10 @@ fn contacts_of_participants_that_cannot_be_are_refused_with_the_line() {
         (
             "[scene]",
             "[run]\nsolver = 'quasi-static'\nload-steps = 4\n[scene]",
-            ["two participants", "`implicit` ones touch each other"],
+            [
+                "two participants whose solvers cannot share a contact",
+                "`implicit` ones, or put both bodies into one participant",
+            ],
         ),
         ("['block', 'plate']", "['block', 'plat']", ["there is no body, obstacle or tool `plat`", ""]),
         ("[scene]", "[run]\ndevice = 'gpu'\n[scene]", ["contact between participants", "cpu"]),

@@ -158,7 +158,7 @@ fn ties_that_cannot_be_are_refused_by_name_and_gaps_are_told() {
         ),
         (
             plain.clone() + "[tie.back]\nbetween = ['block', 'coat']\n",
-            ["follow others by `back`: ties make no chains and no circles", "leave one of the two ties out"],
+            ["follow others by `back`: ties cannot form chains or circles", "leave one of the two ties out"],
         ),
         (
             plain.clone() + SECOND + "between = ['second', 'coat']\n",

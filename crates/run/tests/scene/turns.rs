@@ -136,7 +136,7 @@ fn rotations_that_cannot_follow_are_refused_by_name() {
         ),
         (
             explicit,
-            ["the springs of `edge`, between participants, hold places alone", "leave `rotations` out"],
+            ["`edge` ties two participants by springs, which hold places only", "leave `rotations` out"],
         ),
     ] {
         crate::assert_refused(&text, &pieces);

@@ -43,7 +43,7 @@ pub(super) fn failure(
     let slack = node.or_else(|| Some(bodies.model.facets.get(error.broken()?.0)?.nodes[0]));
     let hint = match slack.is_some_and(|node| bodies.is_slack(node)) {
         true => {
-            "; a membrane resists bending and compression across by nothing: hold it on all sides, give it `pre-tension`, or take \
+            "; a membrane without tension has no transverse stiffness: hold it on all sides, give it `pre-tension`, or take \
              an element with bending"
         }
         false => "",

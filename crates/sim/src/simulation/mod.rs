@@ -156,7 +156,9 @@ impl Simulation {
         order.sort_by_key(|&part| (ratios[part], solves(part) == world.coupled_surfaces.is_empty()));
         let done = vec![0; participants.len()];
         if !(world.ties.is_empty() || world.coupled_surfaces.is_empty()) {
-            return Err(Failure::input(&"participants are tied to each other or touch each other, not both"));
+            return Err(Failure::input(
+                &"participants can be tied to each other or touch each other, but not both",
+            ));
         }
         let springs = Springs::new(&world.ties, &world.parts, between.ties)?;
         let meetings =
@@ -707,7 +709,7 @@ impl Simulation {
         if !forces.is_empty() && forces.len() != nodes {
             let given = forces.len();
             return Err(Failure::input(&format_args!(
-                "{given} forces were given for {nodes} nodes: give one a node of all bodies, or none"
+                "{given} forces were given for {nodes} nodes: give one force for each node of all bodies, or none"
             )));
         }
         if let Some(node) = forces.iter().position(|force| !force.iter().all(|f| f.is_finite())) {

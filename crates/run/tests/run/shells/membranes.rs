@@ -108,7 +108,7 @@ pub(super) fn a_slack_membrane_is_told_and_starts() {
 
     let output = wall(&[(THICK, "thickness = 0.002\nelement = \"membrane\"")]).run(&[]);
     assert_eq!(output.status(), "failed", "{}", output.err);
-    says(&output, &["in `wall`", "a membrane resists bending and compression across by nothing"]);
+    says(&output, &["in `wall`", "a membrane without tension has no transverse stiffness"]);
     assert!(!output.words().contains("inf"), "{}", output.err);
     let plate = "thickness = 0.002\nelement = \"plate\"\npre-tension = 1";
     refused(&[(THICK, plate)], &["`pre-tension` is for a shell with stiffness in its plane"]);

@@ -122,7 +122,7 @@ impl Meshed<'_> {
         let cells: usize = mesh.blocks.iter().map(|block| block.len()).sum();
         let each = if model == BodyModel::Shell { BYTES_OF_SHELL } else { BYTES_OF_CELL };
         let Err(error) = room_for(each * cells as u64) else { return true };
-        let message = format!("there is no room for the model of `{name}`: {error}");
+        let message = format!("not enough memory for the model of `{name}`: {error}");
         self.error(&["body", name, "mesh"], message, &counted(cells, "element"), "use a coarser mesh");
         false
     }
