@@ -42,7 +42,7 @@ impl Context<'_> {
         if !wrong.is_empty() {
             let message =
                 format!("`{key}` is not a fraction in cells of `{}`: {}", draft.name, list_cells(&wrong));
-            let help = "it is the part of a cell that the body fills, above 0 and at most 1";
+            let help = "a fraction is the part of a cell that the body fills, above 0 and at most 1";
             self.error(&path, message, "these fractions", help);
             return None;
         }

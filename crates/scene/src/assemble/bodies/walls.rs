@@ -118,7 +118,7 @@ impl Meshed<'_> {
             ),
             model @ (BodyModel::Membrane | BodyModel::Bar) if !prony.volumetric.is_empty() => (
                 format!(
-                    "law `{law_name}` relaxes in volume, but `{name}` is a {}, whose whole stress relaxes alike",
+                    "law `{law_name}` relaxes in volume, but `{name}` is a {}, where only the stress as a whole can relax",
                     model.word()
                 ),
                 "not in volume",

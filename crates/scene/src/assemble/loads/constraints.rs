@@ -217,7 +217,7 @@ impl Tied<'_> {
         if matches!(curved, Some(Membrane::Curved { .. })) {
             if volume < 0.0 {
                 let message = format!("the triangles of `{}` face inwards", self.bodies[body].name);
-                let help = "turn the triangles of the mesh round, so that they face outwards";
+                let help = "reverse the triangles of the mesh, so that they face outwards";
                 self.error(&at(key), message, "an inside-out surface", help);
                 return;
             }

@@ -51,7 +51,7 @@ impl Tied<'_> {
                     &path[..2],
                     message,
                     "this surface",
-                    "loads and outputs name both alike: rename one",
+                    "loads and outputs could mean either: rename one",
                 );
                 continue;
             }
