@@ -11,7 +11,9 @@
 //! use pliant_contact::shape::Shape;
 //! use pliant_contact::touch::{Rigid, Touch};
 //!
-//! let floor = Rigid { name: "floor".into(), shape: Shape::HalfSpace, trajectory: Trajectory::fixed(Pose::identity()), inside: false, jaw: None };
+//! let trajectory = Trajectory::fixed(Pose::identity());
+//! let shape = Shape::HalfSpace;
+//! let floor = Rigid { name: "floor".into(), shape, trajectory, inside: false, jaw: None };
 //! let touch = Touch { friction: 0.3, offset: 0.0 };
 //! let (now, predicted) = ([0.0, 0.0, 0.001], [0.002, 0.0, -0.001]);
 //! let place = touch.correct(&floor, [0.0, 0.001], now, predicted, [1.0; 3]).unwrap();

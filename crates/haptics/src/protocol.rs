@@ -16,7 +16,8 @@
 //! ```
 //! use pliant_haptics::protocol::{Force, Pose};
 //!
-//! let pose = Pose { sequence: 7, place: [0.0, 0.0, 0.01], quaternion: [1.0, 0.0, 0.0, 0.0], ..Pose::default() };
+//! let quaternion = [1.0, 0.0, 0.0, 0.0];
+//! let pose = Pose { sequence: 7, place: [0.0, 0.0, 0.01], quaternion, ..Pose::default() };
 //! assert_eq!(Pose::decode(&pose.encode()), Some(pose));
 //! assert_eq!(Pose::decode(&Force::default().encode()), None);
 //! ```

@@ -71,14 +71,16 @@ pub fn pose_of([x, y, z]: [f64; 3], quaternion: [f64; 4]) -> Option<Pose> {
 /// let touch = Touch { friction: 0.0, offset: 0.0 };
 /// let contact = Contact { name: "press".into(), surface, with: With::Rigid(0), touch };
 /// let Method::Explicit(explicit) = &mut part.method else { unreachable!() };
-/// explicit.contacts = Some(Arc::new(Contacts { rigids: vec![ball], contacts: vec![contact], ..Default::default() }));
+/// let contacts = Contacts { rigids: vec![ball], contacts: vec![contact], ..Default::default() };
+/// explicit.contacts = Some(Arc::new(contacts));
 ///
 /// let mut simulation = Simulation::new(part)?;
 /// let arrival = simulation.drive("ball", Pose::translation(0.0, 0.0, 0.11), 0.1)?;
 /// simulation.run(arrival, |_| ())?;
 /// let ball = simulation.frame()?.tool("ball").unwrap();
 /// assert!((ball.pose.translation.z - 0.11).abs() < 1e-12 && ball.force[2] > 0.0);
-/// assert!(ball.torque.unwrap().iter().all(|m| m.abs() < 1e-3 * 0.02 * ball.force[2]), "without friction nothing turns a ball");
+/// // Without friction nothing turns a ball.
+/// assert!(ball.torque.unwrap().iter().all(|m| m.abs() < 1e-3 * 0.02 * ball.force[2]));
 /// # Ok::<(), pliant_sim::Failure>(())
 /// ```
 impl Simulation {

@@ -45,7 +45,7 @@ enum Fibre {
 /// One term of a Prony series.
 #[derive(Debug, PartialEq, Deserialize, JsonSchema)]
 struct Term {
-    /// What relaxes.
+    /// The part that relaxes.
     part: Part,
     /// Share of the stress that relaxes [1].
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
@@ -74,7 +74,7 @@ enum Step {
     Seconds(#[schemars(extend("exclusiveMinimum" = 0.0))] f64),
 }
 
-/// Which nodes of a body.
+/// The nodes of a body.
 #[derive(Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 enum Nodes {
@@ -240,7 +240,7 @@ fn a_missing_key_is_shown_at_the_header_or_the_table() {
         &[[
             "missing keys `part`, `weight` in `t.prony[0]`",
             "{}",
-            "`part`: What relaxes. (one of \"isochoric\", \"whole\", \"volumetric\")\n\
+            "`part`: The part that relaxes. (one of \"isochoric\", \"whole\", \"volumetric\")\n\
              `weight`: Share of the stress that relaxes [1]. (a number)",
         ]],
     );
@@ -416,7 +416,7 @@ fn a_choice_takes_exactly_one_of_its_keys() {
     let nodes = |value: &str| format!("{MOVE}nodes = {value}\n");
     let exactly = "give exactly one of `box`, `sphere`, `set`, `indices`";
     let expected = "expected \"all\", { box = … }, { sphere = … }, { set = … } or { indices = … }";
-    let doc = "`nodes`: Which nodes of a body.";
+    let doc = "`nodes`: The nodes of a body.";
     expect::<Move>(
         &nodes("{}"),
         &[["`t.nodes`: one of `box`, `sphere`, `set`, `indices` is missing", "{}", exactly]],

@@ -21,7 +21,8 @@
 //! It depends on F alone. Its gradient is ∂g/∂F = F G with
 //!
 //! ```text
-//! G = g′ r ((2 T S + S′)/|dev τ|² − ∂|dev b̄|²/∂C / (|dev b̄|² + ε²)),   g′ = (x⁴ + 3 δ² x²)/(x² + δ²)²,   T = S C − ⅓ tr(S C) I,
+//! G = g′ r ((2 T S + S′)/|dev τ|² − ∂|dev b̄|²/∂C / (|dev b̄|² + ε²)),
+//! g′ = (x⁴ + 3 δ² x²)/(x² + δ²)²,   T = S C − ⅓ tr(S C) I,
 //! ```
 //!
 //! where S′ is the derivative of S along δF = dev τ F = F T, found by differences: only the stress of a law

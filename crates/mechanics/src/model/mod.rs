@@ -254,8 +254,10 @@ impl Model {
     /// use pliant_mechanics::model::{Cells, Material, Solid};
     ///
     /// let mut model = Model::default();
-    /// let tet = model.add_body("tet", &[[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]]);
-    /// let law = AnyLaw::NeoHookean(NeoHookean { shear: 1000.0, volumetric: Volumetric::quadratic(10_000.0) });
+    /// let corners = [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]];
+    /// let tet = model.add_body("tet", &corners);
+    /// let volumetric = Volumetric::quadratic(10_000.0);
+    /// let law = AnyLaw::NeoHookean(NeoHookean { shear: 1000.0, volumetric });
     /// let cells = Cells::tet4(vec![[0, 1, 2, 3]], &model.rest);
     /// model.add_solid(Solid::new(tet, Material::elastic(law, 1000.0), cells));
     /// model.fix("base", vec![0, 1, 2]);

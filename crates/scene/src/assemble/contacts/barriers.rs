@@ -1,18 +1,15 @@
 //! Contacts of the solvers `implicit` and `static`: how their barriers act, and whether bodies are apart at
 //! the start.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::HashSet;
 use std::sync::Arc;
 
 use pliant_format::tables::ContactTable;
-use pliant_geometry::words::{counted, number};
-use pliant_implicit::{ContactModel, State, apart_counts, meetings};
-use pliant_sim::contact::barrier::{BarrierSettings, Meeting};
+use pliant_implicit::{ContactModel, State, meetings};
+use pliant_sim::contact::barrier::BarrierSettings;
 use pliant_sim::contact::touch::{Contacts, With};
 
 use super::{InContact, Loaded, Partner};
-use crate::assemble::in_metres;
-use crate::assemble::start::Started;
 
 /// The distance of a barrier over the diagonal of all bodies, if none is given.
 const DISTANCE: f64 = 1e-3;
@@ -20,16 +17,14 @@ const DISTANCE: f64 = 1e-3;
 const STIFFNESS: f64 = 0.1;
 /// The speed [m/s] below which friction lets bodies creep, if none is given.
 const CREEP: f64 = 1e-3;
-/// Places without a gap that are listed.
-const LISTED: usize = 3;
 
 /// The barriers of a scene, as their contacts are made.
 #[derive(Debug, Default)]
-pub(super) struct BarrierTables {
+pub(in crate::assemble) struct BarrierTables {
     settings: Vec<BarrierSettings>,
     levels: Vec<u8>,
     /// The table of each contact.
-    tables: Vec<String>,
+    pub(in crate::assemble) tables: Vec<String>,
     /// True if states are searched for intersections, also without barriers.
     pub check: bool,
 }
@@ -40,7 +35,7 @@ impl BarrierTables {
         self.settings.iter().map(|settings| settings.distance).collect()
     }
 
-    fn contact_model(&self, contacts: &Arc<Contacts>) -> ContactModel {
+    pub(in crate::assemble) fn contact_model(&self, contacts: &Arc<Contacts>) -> ContactModel {
         ContactModel {
             contacts: Arc::clone(contacts),
             settings: self.settings.clone(),
@@ -195,6 +190,11 @@ impl Loaded<'_> {
 }
 
 impl InContact<'_> {
+    /// The barriers of the scene.
+    pub(in crate::assemble) fn barriers(&self) -> &BarrierTables {
+        &self.terms.barriers
+    }
+
     /// True if written states are searched for intersections, because no barrier prevents them.
     pub(in crate::assemble) fn checks_intersections(&self) -> bool {
         !self.scene.run.solver.solves_equations() && self.contacts.is_some() && self.terms.barriers.check
@@ -211,66 +211,5 @@ impl InContact<'_> {
         let met = meetings(&barriers.contact_model(contacts), &self.assembly, start);
         let names = met.iter().map(|one| &barriers.tables[one.contact as usize]);
         names.into_iter().find(|name| is_asked(name)).cloned()
-    }
-}
-
-impl Started<'_> {
-    /// Gives the contacts to the model of a solver with barriers, unless bodies have no gap at the start.
-    pub(in crate::assemble) fn touch(&mut self) {
-        let (Some(contacts), Some(start)) = (self.contacts.clone(), &self.start) else { return };
-        if !self.scene.run.solver.solves_equations() {
-            return;
-        }
-        let model = self.terms.barriers.contact_model(&contacts);
-        let tables = self.terms.barriers.tables.clone();
-        let met = meetings(&model, &self.assembly, start);
-        let mut of_contacts = BTreeMap::<u32, Vec<Meeting>>::new();
-        met.into_iter().for_each(|one| of_contacts.entry(one.contact).or_default().push(one));
-        for (contact, met) in &of_contacts {
-            self.refuse_meetings(&contacts.contacts[*contact as usize].name, &tables[*contact as usize], met);
-        }
-        for (contact, count) in contacts.contacts.iter().zip(apart_counts(&model, &self.assembly)) {
-            if count > 0 {
-                self.notes.push(format!(
-                    "contact `{}`: {} (a node and a triangle, or two edges) never touch, because they are in one place at rest",
-                    contact.name,
-                    counted(count, "pair")
-                ));
-            }
-        }
-        self.assembly.contact = Some(model);
-    }
-
-    fn refuse_meetings(&mut self, contact: &str, table: &str, met: &[Meeting]) {
-        let message = |one: &Meeting| {
-            let (body, node) = self.assembly.locate_node(one.node);
-            let how = match one.gap {
-                Some(gap) => format!("a gap of {} m", number(gap)),
-                None => "an edge through a triangle".into(),
-            };
-            format!("node {node} of `{}` at {}: {how}", self.bodies[body].name, in_metres(one.place))
-        };
-        let mut sorted = met.to_vec();
-        sorted.sort_by(|a, b| {
-            a.gap.unwrap_or(f64::NEG_INFINITY).total_cmp(&b.gap.unwrap_or(f64::NEG_INFINITY))
-        });
-        let first: Vec<String> = sorted.iter().take(LISTED).map(message).collect();
-        let message = format!(
-            "contact `{contact}` has no gap at the start in {}: {}{}",
-            counted(met.len(), "place"),
-            first.join("; "),
-            if met.len() > LISTED { "; …" } else { "" }
-        );
-        let asked = self.scene.contacts.iter().find(|(known, _)| known == table).map(|(_, table)| table);
-        let help = match asked {
-            Some(table) if table.separate || table.gap.is_some() => {
-                "move one of them (`at`), make `thickness` smaller, or take finer cells there: overlaps must be smaller than the cells"
-            }
-            _ => {
-                "push the bodies apart with `gap = 2e-4` or `separate = true`, move one of them (`at`), or make `thickness` smaller: \
-                 a barrier needs a gap at the start"
-            }
-        };
-        self.error(&["contact", table, "between"], message, "no gap", help);
     }
 }

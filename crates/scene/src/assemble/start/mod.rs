@@ -1,5 +1,7 @@
 //! The phase [`Started`]: where a run begins.
 
+mod touching;
+
 use std::collections::HashSet;
 use std::sync::Arc;
 
