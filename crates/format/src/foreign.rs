@@ -4,20 +4,20 @@ use std::path::Path;
 
 /// Files by their ending: kind and advice.
 const BY_ENDING: [(&str, &str, &str); 9] = [
-    ("inp", "an input deck of Abaqus or CalculiX", "`meshio convert model.inp model.vtu` makes a mesh of it"),
-    ("bdf", "an input deck of Nastran", "`meshio convert model.bdf model.vtu` makes a mesh of it"),
-    ("med", "a mesh of Salome", "`meshio convert model.med model.vtu` makes a mesh of it"),
+    ("inp", "an input deck of Abaqus or CalculiX", "convert it with `meshio convert model.inp model.vtu`"),
+    ("bdf", "an input deck of Nastran", "convert it with `meshio convert model.bdf model.vtu`"),
+    ("med", "a mesh of Salome", "convert it with `meshio convert model.med model.vtu`"),
     ("k", "an input deck of LS-DYNA", "export its mesh as VTK from the program that made it"),
     ("feb", "a model of FEBio", "export its mesh as VTK from FEBio Studio"),
-    ("scn", "a scene of SOFA", "its mesh is the file that its loader names in `filename`: give that one"),
-    ("step", "a CAD model without cells", "Gmsh makes a mesh of it: `gmsh -3 model.step -o model.msh`"),
-    ("stp", "a CAD model without cells", "Gmsh makes a mesh of it: `gmsh -3 model.stp -o model.msh`"),
-    ("iges", "a CAD model without cells", "Gmsh makes a mesh of it: `gmsh -3 model.iges -o model.msh`"),
+    ("scn", "a scene of SOFA", "give the mesh file that its loader names in `filename`"),
+    ("step", "a CAD model without cells", "mesh it with Gmsh: `gmsh -3 model.step -o model.msh`"),
+    ("stp", "a CAD model without cells", "mesh it with Gmsh: `gmsh -3 model.stp -o model.msh`"),
+    ("iges", "a CAD model without cells", "mesh it with Gmsh: `gmsh -3 model.iges -o model.msh`"),
 ];
 
 /// Scenes in XML by a word that they contain.
 const BY_WORD: [(&str, &str, &str); 3] = [
-    ("<Model", "a model of NiftySim", "`pliant import MODEL.xml -o scene.toml` makes a scene of it"),
+    ("<Model", "a model of NiftySim", "convert it with `pliant import MODEL.xml -o scene.toml`"),
     (
         "<febio_spec",
         "a model of FEBio",
@@ -26,7 +26,7 @@ const BY_WORD: [(&str, &str, &str); 3] = [
     (
         "<Node",
         "a scene of SOFA",
-        "write a scene with `pliant new`, and name the mesh files of its loaders there",
+        "write a scene with `pliant new`, and name there the mesh files of the SOFA loaders",
     ),
 ];
 

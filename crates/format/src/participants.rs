@@ -196,8 +196,8 @@ impl Scene {
                     let help = "leave one of them out";
                     out.push(Diagnostic::error(message).at(place, "again").help(help));
                 } else if let Some((other, _)) = group_of(&groups, body) {
-                    let message = format!("`{body}` goes with participant `{other}` already");
-                    let help = "a body has one participant: leave it out of the others";
+                    let message = format!("`{body}` already belongs to participant `{other}`");
+                    let help = "a body belongs to one participant: remove it from the others";
                     out.push(Diagnostic::error(message).at(place, "named twice").help(help));
                 }
             }
@@ -224,10 +224,10 @@ impl Scene {
             if self.participants.iter().any(|(name, _)| name == word) {
                 let place = self.source.key_span(&["participant", word]);
                 let message = format!(
-                    "`{}` goes with no participant, and the name of the others, `{word}`, is taken",
+                    "`{}` belongs to no participant, and the default name for such bodies, `{word}`, is taken",
                     bodies[0]
                 );
-                let help = "name it there, or give this participant another name";
+                let help = "add the body to this participant, or rename the participant";
                 out.push(Diagnostic::error(message).at(place, "taken").help(help));
             }
             groups.push((word.into(), bodies));
@@ -267,17 +267,17 @@ impl Scene {
             {
                 true => (
                     format!(
-                        "`{name}` is a shell on `{host}`, and `{}` steps shells apart",
+                        "`{name}` is a shell on `{host}`, but the solver `{}` steps shells separately from solids",
                         self.run.solver.word()
                     ),
                     "bending needs another solver",
-                    "leave `model` out for a membrane, without bending, or take `solver = \"implicit\"` or `\"static\"`",
+                    "remove `model` for a membrane without bending, or set `solver = \"implicit\"` or `\"static\"`",
                 ),
                 false => (
                     format!(
-                        "`{name}` goes with participant `{own}` and `{host}`, whose nodes it shares, with `{other}`"
+                        "`{name}` shares the nodes of `{host}`, but belongs to participant `{own}`, and `{host}` to `{other}`"
                     ),
-                    "not of one solver",
+                    "different participants",
                     "name both in one participant",
                 ),
             };

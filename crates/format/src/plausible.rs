@@ -62,15 +62,15 @@ pub(crate) fn remark(value: f64, unit: &str, positive: bool, shown: &str) -> Opt
     let range = |range: &RangeInclusive<f64>| format!("{:e} to {:e}{unit}", range.start(), range.end());
     if positive && outside(&quantity.possible) {
         let message =
-            format!("is {shown}{unit}; values from {} can be computed with", range(&quantity.possible));
-        return Some(Remark { is_mistake: true, message, label: "beyond all sense", help });
+            format!("is {shown}{unit}, outside the possible range of {}", range(&quantity.possible));
+        return Some(Remark { is_mistake: true, message, label: "impossible", help });
     }
     outside(&quantity.likely).then(|| {
         let usual = match positive {
-            true => format!("usual are {}", range(&quantity.likely)),
-            false => format!("usual is less than {:e}{unit}", quantity.likely.end()),
+            true => format!("usual values are {}", range(&quantity.likely)),
+            false => format!("usual values are less than {:e}{unit}", quantity.likely.end()),
         };
-        let message = format!("is {shown}{unit}, and {usual}: is that so?");
+        let message = format!("is {shown}{unit}, but {usual}: check the value");
         Remark { is_mistake: false, message, label: "unusual", help }
     })
 }
@@ -85,7 +85,10 @@ mod tests {
         let Some(Remark { is_mistake, message, .. }) = of(5000.0) else {
             panic!("5000 is no usual friction")
         };
-        assert!(!is_mistake && message == "is 5000, and usual is less than 1e3: is that so?", "{message}");
+        assert!(
+            !is_mistake && message == "is 5000, but usual values are less than 1e3: check the value",
+            "{message}"
+        );
         assert!(of(0.0).is_none() && of(2.0).is_none());
     }
 }

@@ -284,7 +284,7 @@ fn by_name<T>(mut tables: Vec<(String, T)>) -> Vec<(String, T)> {
 fn check_name(of: &str, name: &str, node: &Node, out: &mut Vec<Diagnostic>) -> bool {
     let plain = !name.is_empty() && name.chars().all(|c| c.is_alphanumeric() || c == '-' || c == '_');
     if !plain {
-        let help = "take letters, digits, `-` and `_`: files and columns are called after it";
+        let help = "use letters, digits, `-` and `_`: files and columns carry this name";
         let message = format!("`{name}` cannot be the name of {of}");
         out.push(Diagnostic::error(message).at(node.key_place(), "this name").help(help));
     }

@@ -370,8 +370,8 @@ impl Source {
             let list = known.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
             let help = match nearest(name, known.iter().copied()) {
                 Some(near) => format!("did you mean `{near}`?"),
-                None if known.is_empty() => format!("it has no `[{kind}.NAME]` at all"),
-                None => format!("it has {list}"),
+                None if known.is_empty() => format!("the scene has no table `[{kind}.NAME]`"),
+                None => format!("the scene has {list}"),
             };
             let message = format!("the scene has no {kind} `{name}`");
             return Err(Box::new(Diagnostic::error(message).at(place(1), "no such table").help(help)));
@@ -491,12 +491,12 @@ fn joined(path: &[(String, Place)]) -> String {
 fn no_table(path: &[(String, Place)], depth: usize) -> Box<Diagnostic> {
     let (whole, leaf) = (joined(path), joined(&path[..depth]));
     let message = format!("`{whole}` cannot be set: `{leaf}` is not a table");
-    Box::new(Diagnostic::error(message).at(path[depth].1.clone(), "no key of a table"))
+    Box::new(Diagnostic::error(message).at(path[depth].1.clone(), "not inside a table"))
 }
 
 fn no_such_item(path: &[(String, Place)], depth: usize, len: usize) -> Box<Diagnostic> {
     let (whole, array) = (joined(path), joined(&path[..depth]));
-    let message = format!("`{whole}` cannot be set: `{array}` is an array of {len}");
+    let message = format!("`{whole}` cannot be set: the array `{array}` has {len} items");
     let diagnostic = Diagnostic::error(message).at(path[depth].1.clone(), "no such item");
     Box::new(diagnostic.help("items are counted from 0"))
 }

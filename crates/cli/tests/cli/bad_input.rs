@@ -46,7 +46,11 @@ fn every_mistake_is_underlined_on_standard_error() {
     // Doubtful values give a warning, and do not stop the run.
     let output = Workshop::block("density = 1000", "density = 1e-6").pliant(&["check", "case"]);
     assert_eq!(output.code, 0, "{}", output.err);
-    assert!(output.words().contains("is that so?") && output.underlines("density = 1e-6"), "{}", output.err);
+    assert!(
+        output.words().contains("check the value") && output.underlines("density = 1e-6"),
+        "{}",
+        output.err
+    );
 }
 
 #[test]

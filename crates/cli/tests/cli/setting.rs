@@ -60,7 +60,10 @@ fn a_mistake_shows_what_was_typed_underlined() {
     let workshop = Workshop::new(BLOCK);
     for (set, pieces) in [
         ("law.tisue.young-modulus=4e3", &["the scene has no law `tisue`", "did you mean `tissue`?"][..]),
-        ("load.wobble.total=[0, 0, 1]", &["no load `wobble`", "it has `push`, `wind`, `squeeze`, `tilt`"]),
+        (
+            "load.wobble.total=[0, 0, 1]",
+            &["no load `wobble`", "the scene has `push`, `wind`, `squeeze`, `tilt`"],
+        ),
         ("law.tissue.yong-modulus=4e3", &["unknown key `yong-modulus`", "did you mean `young-modulus`?"]),
         ("lw.tissue.young-modulus=4e3", &["unknown table `lw`", "did you mean `law`?"]),
         ("law.tissue.poisson-ratio=0.7", &["`law.tissue.poisson-ratio` must be", "found 0.7"]),
@@ -68,7 +71,7 @@ fn a_mistake_shows_what_was_typed_underlined() {
         ("run.solver=quasistatic", &["did you mean \"quasi-static\"?"]),
         ("body.block.law=tisue", &["there is no law `tisue`", "did you mean `tissue`?"]),
         ("run.step=1", &["the step 1.000 s is above the critical time step"]),
-        ("scene.gravity.3=0", &["`scene.gravity` is an array of 3", "counted from 0"]),
+        ("scene.gravity.3=0", &["the array `scene.gravity` has 3 items", "counted from 0"]),
         ("scene.until.x=0", &["`scene.until` is not a table"]),
         ("scene.until", &["is not an assignment", "write key=value, such as run.threads=2"]),
         ("scene.until=", &["is not an assignment", "write key=value"]),

@@ -95,8 +95,8 @@ nodes = {{ half-space = {{ point = {point:?}, normal = {normal:?} }} }}
     );
     let side = ["x", "y", "z"][axis];
     let mut assumed = format!(
-        "`{name}` is a mesh: lengths are taken as {unit} ({} m along {side}), the tissue as neo-Hookean with E = 5 kPa, ν = 0.45 and \
-         1000 kg/m³, held at its lowest tenth along {side}",
+        "`{name}` is a mesh: lengths are taken as {unit} ({} m along {side}); the tissue is neo-Hookean with E = 5 kPa, ν = 0.45 and \
+         1000 kg/m³; its lowest tenth along {side} is held",
         number(length)
     );
     if filled {

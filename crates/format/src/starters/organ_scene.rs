@@ -70,7 +70,7 @@ impl OrganScene {
         };
         let title = serde_json::Value::from(self.title.as_str());
         let mut text = format!(
-            "# Made by `pliant mesh`. Moduli are common values: take those of your tissue.\n\n\
+            "# Made by `pliant mesh`. Moduli are common values: replace them by values of your tissue.\n\n\
              [scene]\ntitle = {title}\nuntil = 3.0                     # s\n\n{}",
             law("tissue", TISSUE)
         );
@@ -94,7 +94,7 @@ impl OrganScene {
         for (index, (source, thickness)) in self.vessels.iter().enumerate() {
             let name = format!("vessel-{}", index + 1);
             text += &format!(
-                "# The wall of a vessel, tied to the tissue round it; outside of the organ it is free.\n\
+                "# The wall of a vessel, tied to the tissue around it; outside the organ the wall is free.\n\
                  [body.{name}]\nmodel = \"membrane\"\nmesh = {{ {source}, as = \"surface\", edge = {:?} }}\n\
                  law = \"vessel\"\ndensity = 1100.0\nthickness = {thickness:?}\ndamping = {damping:?}\n\n\
                  [tie.{name}]\nbetween = [\"{name}\", \"organ\"]\n\n",

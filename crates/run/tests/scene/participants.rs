@@ -175,7 +175,7 @@ fn mistakes_of_participants_are_underlined() {
         (table("['strip', 'strip']", ""), "`strip` is named twice"),
         (
             table("['strip']", "[participant.other]\nbodies = ['strip']\n"),
-            "`strip` goes with participant `walls` already",
+            "`strip` already belongs to participant `walls`",
         ),
         (
             table("['strip']", "mass-scaling = { target-step = 1 }\n"),

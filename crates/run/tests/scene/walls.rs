@@ -194,7 +194,7 @@ fn walls_on_what_is_no_solid_of_theirs_are_refused_by_name() {
                 "[law.capsule]",
                 "[participant.a]\nbodies = ['block']\n[participant.b]\nbodies = ['capsule']\n[law.capsule]",
             ),
-            ["whose nodes it shares, with `a`", "name both in one participant"],
+            ["shares the nodes of `block`", "name both in one participant"],
         ),
         (with("on = 'block'\n", ""), ["missing key `mesh` in `body.capsule`", "`on`"]),
     ] {

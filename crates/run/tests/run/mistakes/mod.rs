@@ -646,18 +646,26 @@ fn a_rule_for_fibres_that_fails_is_shown_where_it_is_written() {
 #[test]
 fn values_beyond_all_sense_are_refused_and_unusual_ones_doubted() {
     for (good, bad, says) in [
-        ("young-modulus = 10e3", "young-modulus = 1e-300", "is 1e-300 Pa; values from 1e-20 to 1e20 Pa"),
-        ("density = 1000", "density = 1e300", "is 1e300 kg/m³; values from 1e-15 to 1e15 kg/m³"),
-        ("until = 0.02", "until = 1e30", "`scene.until` is 1e30 s; values from"),
+        (
+            "young-modulus = 10e3",
+            "young-modulus = 1e-300",
+            "is 1e-300 Pa, outside the possible range of 1e-20 to 1e20 Pa",
+        ),
+        (
+            "density = 1000",
+            "density = 1e300",
+            "is 1e300 kg/m³, outside the possible range of 1e-15 to 1e15 kg/m³",
+        ),
+        ("until = 0.02", "until = 1e30", "`scene.until` is 1e30 s, outside the possible range"),
     ] {
         assert_refused(&Workshop::block(good, bad), &[bad], &[says, "values are in SI units"]);
     }
     for (good, odd, says) in [
-        ("young-modulus = 10e3", "young-modulus = 1e-3", "1e-2 to 1e13 Pa: is that so?"),
-        ("density = 1000", "density = 1e-6", "and usual are 1e-1 to 1e5 kg/m³: is that so?"),
+        ("young-modulus = 10e3", "young-modulus = 1e-3", "1e-2 to 1e13 Pa: check the value"),
+        ("density = 1000", "density = 1e-6", "but usual values are 1e-1 to 1e5 kg/m³: check the value"),
         ("density = 1000", "density = 1e-6", "1 g/cm³ is 1000 kg/m³"),
-        ("pressure = 20", "pressure = -1e15", "and usual is less than 1e13 Pa"),
-        ("total = [0.1, 0, 0]", "total = [1e40, 0, 0]", "is 1e40 N, and usual is less than 1e9 N"),
+        ("pressure = 20", "pressure = -1e15", "but usual values are less than 1e13 Pa"),
+        ("total = [0.1, 0, 0]", "total = [1e40, 0, 0]", "is 1e40 N, but usual values are less than 1e9 N"),
     ] {
         let output = Workshop::block(good, odd).check(&[]);
         assert_eq!(output.status(), "checked", "{}", output.err);
