@@ -28,13 +28,13 @@ pub(crate) fn remedy(failure: &Failure, part: &Part, now: &dyn Instant) -> Optio
     }
     let seen = stability.smallest.as_ref().map(|look| look.limit / plan.steps.step);
     let cuts = match stability.halvings {
-        0 => "the run cuts its steps already".to_owned(),
+        0 => "the run already cuts its steps".to_owned(),
         n => format!("the run cuts its steps, went back {} and halved them", counted(n as usize, "time")),
     };
     let shorter = format!("a `step` of {} s or less", number(0.5 * step));
     let message = match (failure.kind, on_unstable) {
         (FailureKind::Unstable, OnUnstableName::Substep) => format!(
-            "{cuts}, into 100 parts at the most, and that is not enough: try a slower or smaller motion, a coarser mesh there, or {shorter}"
+            "{cuts}, but even 100 parts are not enough: try a slower or smaller motion, a coarser mesh there, or {shorter}"
         ),
         (FailureKind::Unstable, _) => {
             "try a smaller `step` or a slower motion, or let the run cut its steps (`on-unstable = \"substep\"`)".into()
@@ -85,7 +85,7 @@ fn too_much_damping(failure: &Failure, built: &Built, step: f64) -> Option<Strin
     let body = built.model.bodies.iter().find(|body| failure.body.as_deref() == Some(&body.name))?;
     (body.damping * step > RESOLVED).then(|| {
         format!(
-            "the damping of `{}`, {} 1/s, is too strong for steps of {} s: it turns velocities round; take `damping` below {} 1/s or a \
+            "the damping of `{}`, {} 1/s, is too strong for steps of {} s: it would reverse velocities; take `damping` below {} 1/s or a \
              `step` below {} s",
             body.name,
             number(body.damping),

@@ -89,7 +89,7 @@ pub enum ResumeError {
         expected: u64,
     },
     /// Its checksum is wrong.
-    #[error("the checkpoint `{}` is damaged: its checksum does not fit its content", path.display())]
+    #[error("the checkpoint `{}` is damaged: its checksum does not match its content", path.display())]
     Damaged {
         /// The file.
         path: PathBuf,
@@ -175,13 +175,14 @@ impl ResumeError {
         match self {
             Self::Unreadable { .. } => "check the path and the permissions".into(),
             Self::NoneIn { .. } => {
-                "a run leaves some where the scene says `checkpoint = { every = 1.0 }` in `[run]`".into()
+                "add `checkpoint = { every = 1.0 }` to `[run]`: the run then writes checkpoints".into()
             }
             Self::NotACheckpoint { .. } => {
                 "give a file checkpoint-….pliant of an earlier run, or the folder it is in".into()
             }
             Self::Truncated { .. } | Self::Damaged { .. } => {
-                "take the one before it, which a run keeps too, or run the scene from the start".into()
+                "use the checkpoint before it, which the run keeps too, or run the scene from the start"
+                    .into()
             }
             Self::OtherFormat { .. } => {
                 "resume with the version of pliant that wrote it, or run the scene from the start".into()
@@ -197,7 +198,7 @@ impl ResumeError {
             Self::OtherScene { until, .. } => {
                 let curve = until.map_or(String::new(), |until| {
                     format!(
-                        "; a curve without `to` ends with the scene: write `to = {until}` where it ended so far"
+                        "; a curve without `to` ends with the scene: give such curves `to = {until}`, the former end"
                     )
                 });
                 format!(
@@ -206,10 +207,10 @@ impl ResumeError {
                 )
             }
             Self::AtTheEnd { .. } => {
-                "nothing was changed; to go on, let the scene last longer with `--until`".into()
+                "nothing was changed; to continue, extend the scene with `--until`".into()
             }
             Self::BeyondTheEnd { .. } => {
-                "let the scene last longer with `--until`, or resume from an earlier checkpoint".into()
+                "extend the scene with `--until`, or resume from an earlier checkpoint".into()
             }
             Self::Folder(error) => error.remedy.into(),
             Self::OtherOutputs { .. } => {

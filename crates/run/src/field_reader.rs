@@ -15,7 +15,7 @@ use crate::output::{FieldMesh, frames};
 pub fn field_named(name: &str) -> Result<FieldName, Failure> {
     FieldName::ALL.into_iter().find(|field| field.name() == name).ok_or_else(|| {
         let all: Vec<&str> = FieldName::ALL.iter().map(|field| field.name()).collect();
-        Failure::input(&format_args!("there is no field `{name}`; there are {}", all.join(", ")))
+        Failure::input(&format_args!("there is no field `{name}`; known fields: {}", all.join(", ")))
     })
 }
 
@@ -71,7 +71,7 @@ impl FieldReader {
                 let all = [first, second].into_iter().chain(found);
                 Ok(Cow::Owned(all.flat_map(|data| &data.values).copied().collect()))
             }
-            (None, _) => Err(Failure::input(&format_args!("the field `{name}` is not one of this body"))),
+            (None, _) => Err(Failure::input(&format_args!("this body has no field `{name}`"))),
         }
     }
 }

@@ -81,7 +81,7 @@ impl Live {
     pub fn halve_steps(&mut self) -> Result<(), Failure> {
         let mut state = self.simulation.state()?;
         if !state.halve_steps(self.simulation.world()) {
-            return Err(Failure::input(&"the steps of this scene can't be halved"));
+            return Err(Failure::input(&"the steps of this scene cannot be halved"));
         }
         self.restore(state)
     }

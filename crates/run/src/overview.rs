@@ -241,7 +241,7 @@ fn write_factors(page: &mut String, scene: &Scene, built: &Built) -> fmt::Result
                 let free = memory::in_words(free);
                 writeln!(
                     page,
-                    "warning: {free} are free: take `linear = {{ by = \"conjugate-gradients\" }}` or a coarser mesh"
+                    "warning: only {free} are free: take `linear = {{ by = \"conjugate-gradients\" }}` or a coarser mesh"
                 )?;
             }
             Ok(())

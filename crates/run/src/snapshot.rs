@@ -44,7 +44,7 @@ pub fn snapshot_framed(world: &World, body: &[u8]) -> Vec<u8> {
 pub fn snapshot_from_bytes(world: &World, bytes: &[u8]) -> Result<State, Failure> {
     let refused = |reason: &str| Err(Failure::input(&format_args!("the snapshot {reason}")));
     if !bytes.starts_with(&MAGIC) {
-        return refused("does not begin as one: these are other bytes");
+        return refused("has no snapshot header: the bytes are something else");
     }
     let number = |at: usize| bytes.get(at..at + 8)?.try_into().ok().map(u64::from_le_bytes);
     let format = bytes.get(8..12).and_then(|own| own.try_into().ok()).map_or(0, u32::from_le_bytes);

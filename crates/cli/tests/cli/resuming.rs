@@ -82,7 +82,7 @@ fn ctrl_c_leaves_a_checkpoint_and_says_how_to_go_on() {
     };
     let (workshop, output) = interrupt(&long, "out/parts");
     assert_eq!((output.code, &output.json()["status"]), (130, &"interrupted".into()), "{}", output.err);
-    assert!(output.words().contains("go on with `--resume out/parts/checkpoint-"), "{}", output.err);
+    assert!(output.words().contains("continue with `--resume out/parts/checkpoint-"), "{}", output.err);
     assert!(workshop.read("out/parts/summary.md").contains("**Interrupted**"));
     workshop.run(&["--resume", "out/parts"]).done();
     workshop.run(&["--out", "out/whole"]).done();

@@ -51,7 +51,7 @@ fn sigterm_and_sighup_end_a_run_as_ctrl_c_does() {
         send(signal, &child);
         let output = Said::from(child.wait_with_output().unwrap());
         assert_eq!((output.code, &output.json()["status"]), (code, &"interrupted".into()), "{}", output.err);
-        assert!(output.words().contains("go on with `--resume out/case/checkpoint-"), "{}", output.err);
+        assert!(output.words().contains("continue with `--resume out/case/checkpoint-"), "{}", output.err);
         assert!(workshop.read("out/case/summary.md").contains("**Interrupted**"));
         assert!(workshop.path("out/case/plot.svg").exists());
         assert!(!workshop.path("out/case/.pliant-lock").exists());

@@ -402,7 +402,7 @@ pub(super) fn verify(path: &Path, bytes: u64, crc: u32) -> Result<(), String> {
     match content.get(..bytes as usize) {
         None => Err(format!("it has {} bytes, and had {bytes} at the checkpoint", content.len())),
         Some(rows) if crc32fast::hash(rows) != crc => {
-            Err("its rows up to the checkpoint are not those of the interrupted run".into())
+            Err("its rows up to the checkpoint differ from the rows of the interrupted run".into())
         }
         Some(_) => Ok(()),
     }

@@ -96,7 +96,7 @@ impl SolidStrains {
             let VolumeChange { body, change, element, time } = own;
             format!(
                 "`{body}` changes its volume by {:+.1} % in element {element} (counted from 0) at t = {} s, though its law is \
-                 nearly incompressible or has fibres: they load its bulk modulus; take a larger `bulk-modulus` or `poisson-ratio`",
+                 nearly incompressible or has fibres, which load the bulk modulus; take a larger `bulk-modulus` or `poisson-ratio`",
                 100.0 * change,
                 number(*time)
             )
@@ -104,8 +104,8 @@ impl SolidStrains {
         let membranes = self.membranes.iter().flatten().filter(|own| own.part > NEAR_WRINKLES).map(|own| {
             let Compression { body, part, force, element, time } = own;
             format!(
-                "the membrane `{body}` is compressed by {} N/m in element {element} (counted from 0) at t = {} s, {:.1} times the force \
-                 at which it wrinkles as short as its mesh: its shape then depends on the mesh; give it bending \
+                "the membrane `{body}` is compressed by {} N/m in element {element} (counted from 0) at t = {} s; this is {:.1} times the force \
+                 at which wrinkles as short as its edges appear, so its shape depends on the mesh; give it bending \
                  (`model = \"shell\"`), or stretch it",
                 number(*force),
                 number(*time),

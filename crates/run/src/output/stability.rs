@@ -101,7 +101,11 @@ impl fmt::Display for StabilitySummary {
                 self.most_substeps
             )?;
         } else if self.steps_below > 0 {
-            write!(f, "; it was below the step during {}", counted(self.steps_below as usize, "step"))?;
+            write!(
+                f,
+                "; the stable step was below the step during {}",
+                counted(self.steps_below as usize, "step")
+            )?;
         }
         if self.halvings > 0 {
             let times = counted(self.halvings as usize, "time");
@@ -192,7 +196,7 @@ fn unstable_equilibria(built: &Built, outcome: &PartOutcome) -> Option<String> {
     let controlled = built.implicit.as_ref().is_some_and(|part| part.control.is_some());
     let from = outcome.effort.as_ref().filter(|_| !controlled)?.unstable_from?;
     Some(format!(
-        "the equilibria from t = {} s on are unstable: the body would buckle or snap there, and has another shape than this one; give it a small load or a small `initial-displacement` across, or take the solver `implicit`",
+        "the equilibria from t = {} s on are unstable: the body would buckle or snap there to another shape; give it a small load or a small `initial-displacement` across, or take `solver = \"implicit\"`",
         number(from)
     ))
 }
@@ -219,7 +223,7 @@ fn equilibria_doubts(outcome: &PartOutcome) -> impl Iterator<Item = String> {
     let largest = internal.abs().max(external.abs());
     let displacement = outcome.equilibria.filter(|found| found.displacement_error > MUCH_ERROR).map(|found| {
         format!(
-            "the displacements of the equilibria are off by about {:.1} %: take a smaller `tolerance`, in single precision with \
+            "the displacements of the equilibria are off by about {:.1} %: take a smaller `tolerance`, and in single precision also \
              `precision = \"double\"`",
             found.displacement_error * 100.0
         )

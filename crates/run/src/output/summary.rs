@@ -190,7 +190,7 @@ pub(crate) fn output_failure(error: &OutputError, time: Option<f64>) -> Failure 
 /// Makes the failure of a stopped run, with the checkpoint that the run left.
 pub(crate) fn interrupted(time: f64, checkpoint: Option<&Path>) -> Failure {
     let way = match checkpoint {
-        Some(path) => format!("go on with `--resume {}`", path.display()),
+        Some(path) => format!("continue with `--resume {}`", path.display()),
         None => {
             "what was written before stays readable; with `checkpoint = { every = 1.0 }` in `[run]` it could \
                  be resumed"
@@ -347,7 +347,7 @@ fn write_page(page: &mut String, world: &World, outcome: &Outcome, summary: &Sum
         write_part(page, part, own)?;
     }
     if world.only().is_none() {
-        writeln!(page, "\n## Energy of all at the end\n\n| | J |\n|---|---|")?;
+        writeln!(page, "\n## Energy of all participants at the end\n\n| | J |\n|---|---|")?;
         write_energy_rows(page, &outcome.energies)?;
     }
     write_reactions(page, world, outcome)?;
@@ -434,11 +434,7 @@ fn write_effort(page: &mut String, effort: &Effort, steps: u64) -> std::fmt::Res
     }
     writeln!(page, "| steps that were halved | {} |", effort.halved)?;
     if effort.unconverged > 0 {
-        writeln!(
-            page,
-            "| steps that did not converge, and were taken as they were | {} |",
-            effort.unconverged
-        )?;
+        writeln!(page, "| accepted steps that did not converge | {} |", effort.unconverged)?;
     }
     let milliseconds = |seconds: f64| number(seconds * 1e3 / steps.max(1) as f64);
     writeln!(page, "| forces and stiffness | {} ms per step |", milliseconds(effort.seconds_cells))?;
@@ -505,7 +501,7 @@ fn write_energies(page: &mut String, of: &str, outcome: &PartOutcome) -> std::fm
     if outcome.balance_floor.is_infinite() {
         return writeln!(
             page,
-            "\nThe balance is not checked: an implicit step dissipates energy like a damper, and external work is a sum of trapezia."
+            "\nThe balance is not checked: an implicit step dissipates energy like a damper, and external work is summed by the trapezoidal rule."
         );
     }
     let Some(equilibria) = &outcome.equilibria else {
@@ -522,17 +518,17 @@ fn write_energies(page: &mut String, of: &str, outcome: &PartOutcome) -> std::fm
         Some(error) => {
             let found = equilibria.found;
             format!(
-                "with {found} equilibria off by about {} J, {:.3} %",
+                "Its error with {found} equilibria is about {} J, {:.3} %",
                 number(error),
                 of_largest(error.abs())
             )
         }
-        None => "with an unknown error, since one load step covers a large part of the way".to_owned(),
+        None => "Its error is unknown, since one load step covers a large part of the way".to_owned(),
     };
     writeln!(
         page,
-        "\nInternal and external energy differ by {:.3} % of the largest energy. Internal energy is what laws store and viscoelastic ones \
-         have dissipated. External energy is the work of loads, reactions and prescribed motions by the trapezoidal rule over each load step, \
+        "\nInternal and external energy differ by {:.3} % of the largest energy. Internal energy is the energy that laws store and viscoelastic laws \
+         have dissipated. External energy is the work of loads, reactions and prescribed motions by the trapezoidal rule over each load step. \
          {error}. More load steps reduce the error, and change neither forces nor displacements of elastic bodies.",
         balance * 100.0
     )
@@ -605,7 +601,7 @@ fn write_coupled_surfaces(page: &mut String, guests: &[CoupledSurfaceSummary]) -
     }
     writeln!(
         page,
-        "\nA step in contact is taken again until the forces on both sides agree to 1 %; what is left acts in the next step."
+        "\nA step in contact is taken again until the forces on both sides agree to 1 %; the remaining difference acts in the next step."
     )
 }
 

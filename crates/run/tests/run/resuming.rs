@@ -438,12 +438,12 @@ fn a_file_that_is_no_checkpoint_is_refused_with_a_reason() {
         workshop.resume_in("x.pliant", "out/case")
     };
     let counted = format!("{} of {} bytes", bytes.len() - 1, bytes.len());
-    refused(&file(&bytes[..bytes.len() - 1]), &["is truncated", &counted, "take the one before it"]);
+    refused(&file(&bytes[..bytes.len() - 1]), &["is truncated", &counted, "use the checkpoint before it"]);
     refused(&file(b"VTK"), &["`x.pliant` is not a checkpoint", "checkpoint-….pliant"]);
     refused(&file(b""), &["`x.pliant` is not a checkpoint"]);
     let mut flipped = bytes.clone();
     flipped[bytes.len() / 2] ^= 1;
-    refused(&file(&flipped), &["is damaged: its checksum does not fit", "take the one before it"]);
+    refused(&file(&flipped), &["is damaged: its checksum does not match", "use the checkpoint before it"]);
     let mut newer = bytes.clone();
     newer[8] = 99;
     refused(&file(&newer), &["has format 99; this version of pliant reads format 20"]);

@@ -96,7 +96,9 @@ fn each_participant_comes_out_as_it_does_alone() {
         assert!((both[&column] - (a + b)).abs() <= 1e-15 * (a.abs() + b.abs()), "{energy}");
     }
     let page = fs::read_to_string(place.path().join("two/summary.md")).unwrap();
-    for piece in ["## Time step of `walls`", "## Time step of `solids`", "## Energy of all at the end"] {
+    for piece in
+        ["## Time step of `walls`", "## Time step of `solids`", "## Energy of all participants at the end"]
+    {
         assert!(page.contains(piece), "no `{piece}` in {page}");
     }
 }
