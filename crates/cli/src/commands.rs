@@ -251,7 +251,7 @@ fn sweep_part(
     say(format_args!("{} runs{known}, {failed} failed\nwrote {}", summary.runs, summary.rows.display()))?;
     told_failures(sweep, &summary.failures);
     if summary.interrupted {
-        eprintln!("error: the part was interrupted; the same command again runs what is missing");
+        eprintln!("error: the part was interrupted; repeat the command to do the missing runs");
         return Ok(signals::exit_code());
     }
     Ok(u8::from(failed > 0))

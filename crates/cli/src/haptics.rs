@@ -97,7 +97,7 @@ fn tool(scene: &Scene, asked: Option<&str>) -> Result<String, Failure> {
         (None, [only]) => Ok((*only).to_owned()),
         (_, []) => Err(Failure::plain("the scene has no tool", "add a `[tool.NAME]` and a contact with it")),
         (Some(asked), _) => {
-            Err(Failure::plain(format!("there is no tool `{asked}`"), format!("there are {}", listed())))
+            Err(Failure::plain(format!("there is no tool `{asked}`"), format!("the tools are {}", listed())))
         }
         (None, _) => Err(Failure::plain(
             "the scene has several tools",
@@ -476,7 +476,7 @@ fn stiffest(model: &LocalModel, settings: Settings) -> Result<String, HapticsErr
     let found = hand.stiffest(model, free, 0.01)?;
     let here = if found > 0.9e6 { "1e6 N/m or more".into() } else { format!("{found:.0} N/m") };
     Ok(format!(
-        "stiffest coupling {here} on the tissue pressed most, without guard; {limit:.0} N/m are passive on anything (device of {} N s/m)",
+        "stiffest coupling {here} where the tissue was pressed most, without guard; {limit:.0} N/m is passive on any object (device friction {} N s/m)",
         hand.friction
     ))
 }

@@ -137,8 +137,8 @@ Examples:
   pliant haptics scenes/palpation --replay finger.csv --hand --set output={}
   pliant haptics scenes/palpation --listen 127.0.0.1:4270       devices connect as docs/guide/tools-and-haptics.md describes
 
-A trace is a table t,x,y,z,qw,qx,qy,qz of the tool in the scene (s, m). It prints the spread of the force period, the latency, the force
-jump, the energy and the stiffest coupling.
+A trace is a table t,x,y,z,qw,qx,qy,qz of the tool in the scene (s, m). The command prints the spread of the force period, the latency, the
+force jump, the energy and the stiffest coupling.
 
 Exit codes: 0 done, 1 the simulation failed, 2 invalid input.";
 

@@ -50,7 +50,7 @@ Examples:
 
 A scene runs first, without its own outputs. Its table [view] sets how it is drawn; the options below override it. A mesh file with
 labels is drawn without a run; any other mesh, or a film, runs a scene as in `pliant view`. A film named .mp4 needs ffmpeg.
-Without ffmpeg, or with a name ending in .png, it is an animated PNG.
+Without ffmpeg, or with a name ending in .png, the film is an animated PNG.
 
 Exit codes: 0 done, 1 the run or a picture failed, 2 invalid input or no adapter, 130 interrupted (Ctrl-C; 128 + signal number for other signals).";
 

@@ -23,12 +23,12 @@ pub fn scene(arguments: &MeshImage) -> Result<u8, Failure> {
         return Err(Failure::plain("the edge of the cells is missing", "for example `--edge 8mm`"));
     };
     let idle = [
-        (is_mesh_file(arguments), "a scene is made of images"),
+        (is_mesh_file(arguments), "a scene as output needs images as input"),
         (
             !matches!(arguments.cells, MeshCells::Tets),
-            "the tissue of a scene is of tets: `--as` has no effect",
+            "a scene meshes its tissue with tets: `--as` has no effect",
         ),
-        (arguments.threshold.is_some(), "`--threshold` has no labels for a scene"),
+        (arguments.threshold.is_some(), "`--threshold` is for meshes: a scene needs labels"),
         (arguments.distance.is_some(), "`--distance` is for meshes"),
         (arguments.inner_edge.is_some(), "`--inner-edge` is for meshes"),
         (!arguments.protect.is_empty(), "`--protect` is for meshes"),
@@ -59,7 +59,7 @@ pub fn scene(arguments: &MeshImage) -> Result<u8, Failure> {
         let voxels = found.labels.labels.iter().filter(|&&label| label != 0).count();
         let tissue = voxels as f64 * found.labels.grid.voxel_volume();
         say(format_args!(
-            "tissue           {:.2} ml, with {:.2} ml of the vessels; {:.2} ml of these run outside of it",
+            "tissue           {:.2} ml, including {:.2} ml of vessels; {:.2} ml of vessels lie outside",
             tissue * 1e6,
             inside * 1e6,
             outside * 1e6
@@ -70,7 +70,10 @@ pub fn scene(arguments: &MeshImage) -> Result<u8, Failure> {
     let inside = (found.labels.labels.iter().enumerate()).filter(|(_, label)| **label != 0);
     let places = inside.map(|(at, _)| grid.position(&grid.triple(at).map(|x| x as f64).into()));
     let Some(bounds) = bulk(places.collect()) else {
-        return Err(Failure::plain("there is no voxel of these labels", "`pliant labels IMAGE` lists them"));
+        return Err(Failure::plain(
+            "no voxel has any of the chosen labels",
+            "`pliant labels IMAGE` lists them",
+        ));
     };
     let folder = arguments.out.parent().unwrap_or(Path::new(""));
     let source = |files: &[&PathBuf], labels: &str| source(arguments, folder, files, labels);
@@ -154,7 +157,7 @@ impl<'a> Sources<'a> {
                 arguments.label.iter().filter(|label| matches!(label, LabelChoice::Group(..))).count();
             if groups > 0 && groups < arguments.label.len() {
                 return Err(Failure::plain(
-                    "a scene has either labels or groups of them",
+                    "`--label` mixes labels and groups",
                     "make each label a group, such as `--label liver=5`",
                 ));
             }
@@ -179,8 +182,11 @@ impl<'a> Sources<'a> {
             };
             found.filter(|&at| at < files.len()).ok_or_else(|| {
                 let names: Vec<String> = files.iter().map(|file| stem(file)).collect();
-                let message = format!("`{label}` is none of the masks");
-                Failure::plain(message, format!("by number from 1, or by name: {}", names.join(", ")))
+                let message = format!("no mask has the number or name `{label}`");
+                Failure::plain(
+                    message,
+                    format!("choose a mask by its number from 1, or by its name: {}", names.join(", ")),
+                )
             })
         };
         let walls = vessels().map(number).collect::<Result<Vec<usize>, Failure>>()?;

@@ -109,7 +109,7 @@ fn refuse_idle(arguments: &MeshImage) -> Result<(), Failure> {
         (file && arguments.series.is_some(), "`--series` is for images"),
         (file && arguments.names.is_some(), "`--names` is for images"),
         (file && masks, "several inputs must be masks, which are images"),
-        (file && arguments.label.len() > 1, "`--label` more than once is for images"),
+        (file && arguments.label.len() > 1, "`--label` can be repeated for images only"),
         (file && skin && labels, "`--label` is for images, and for tets and hexes"),
         (
             file && skin && cleans,
@@ -125,10 +125,10 @@ fn refuse_idle(arguments: &MeshImage) -> Result<(), Failure> {
         (arguments.add.is_some() && file, "`--add` is for images"),
         (
             arguments.add.is_some() && !threshold,
-            "`--add` goes with `--threshold`: it adds values, and labels are not values (list several masks one after the other)",
+            "`--add` needs `--threshold`: it adds values, and labels are not values (list several masks one after the other)",
         ),
-        (arguments.add.is_some() && masks, "`--add` goes with one image, not with several masks"),
-        (labels && threshold && !masks, "`--label` and `--threshold` are two ways to choose voxels"),
+        (arguments.add.is_some() && masks, "`--add` works with one image, not with several masks"),
+        (labels && threshold && !masks, "`--label` and `--threshold` both choose voxels: give only one"),
     ];
     match idle.into_iter().find(|(idle, _)| *idle) {
         Some((_, message)) => Err(Failure::plain(message, "leave it out")),
@@ -149,7 +149,8 @@ fn require_volume_format(arguments: &MeshImage) -> Result<(), Failure> {
 
 fn make(arguments: &MeshImage, bar: &Bar) -> Result<MadeMesh, Failure> {
     if arguments.edge.is_none() && arguments.distance.is_none() {
-        let help = "for example `--edge 8mm`, or 0.008 in metres; for tets `--distance 1mm` selects it";
+        let help =
+            "for example `--edge 8mm`, or 0.008 in metres; for tets, `--distance 1mm` chooses the edge";
         return Err(Failure::plain("the edge of the cells is missing", help));
     }
     let force = arguments.force;

@@ -69,7 +69,7 @@ fn entries(folder: &Path) -> Result<(Vec<Entry>, Sha256), Failure> {
 /// Adds the files of a folder to a hash, without files of some endings.
 fn add_files(hash: &mut Sha256, folder: &Path, without: &[&str]) -> Result<(), Failure> {
     let listed = fs::read_dir(folder).map_err(|error| {
-        Failure::plain(format!("`{}`: {error}", folder.display()), format!("mend the list `{LIST}`"))
+        Failure::plain(format!("`{}`: {error}", folder.display()), format!("correct the list `{LIST}`"))
     })?;
     let mut files: Vec<PathBuf> =
         listed.flatten().map(|file| file.path()).filter(|path| path.is_file()).collect();
@@ -112,11 +112,12 @@ impl Entry {
         words.extend(["--out".into(), out.as_os_str().to_owned()]);
         match Arguments::try_parse_from(words).map(|typed| typed.command) {
             Ok(Command::Render(render)) => Ok(*render),
-            Ok(_) => {
-                Err(Failure::plain("only `pliant render` makes pictures", format!("mend the list `{LIST}`")))
-            }
+            Ok(_) => Err(Failure::plain(
+                "only `pliant render` makes pictures",
+                format!("correct the list `{LIST}`"),
+            )),
             Err(error) => {
-                Err(Failure::plain(format!("{}: {error}", self.file), format!("mend the list `{LIST}`")))
+                Err(Failure::plain(format!("{}: {error}", self.file), format!("correct the list `{LIST}`")))
             }
         }
     }
@@ -183,7 +184,7 @@ fn renew(folder: &Path) -> Result<u8, Failure> {
         fs::write(folder.join(SUMS), lines.collect::<String>()).map_err(unwritable)?;
         say(format_args!("made {}", file.display()))?;
     }
-    say(format_args!("{} pictures were made anew, all others fit their scenes", old.len()))?;
+    say(format_args!("{} pictures were made anew; all others are up to date", old.len()))?;
     Ok(SUCCESS)
 }
 
@@ -205,7 +206,7 @@ fn scenes_in(folder: &Path) -> Vec<PathBuf> {
 /// Runs scenes and makes a page with the last picture of each.
 fn page(arguments: &Render, scenes: &[PathBuf]) -> Result<u8, Failure> {
     if arguments.film.is_some() || arguments.frames.is_some() || arguments.series.is_some() {
-        let message = "a gallery has the last picture of each scene";
+        let message = "a gallery shows only the last picture of each scene";
         return Err(Failure::plain(message, "omit `--film`, `--frames` and `--series`, or give one scene"));
     }
     let graphics = Graphics::open()?;

@@ -283,7 +283,8 @@ fn changes_time(arguments: &Render) -> bool {
 
 fn refuse_words_of_scenes(arguments: &Render) -> Result<(), Failure> {
     if changes_a_run(arguments) {
-        let message = format!("`{}` is a finished run: its scene can't be changed", arguments.what.display());
+        let message =
+            format!("`{}` is a finished run: its scene cannot be changed", arguments.what.display());
         return Err(Failure::plain(message, "give the scene, or omit these options"));
     }
     Ok(())
@@ -431,7 +432,7 @@ fn chosen(arguments: &Render, series: &Series) -> Result<Vec<usize>, Failure> {
     };
     if frames.is_empty() {
         let message = format!("series `{}` has {count} frames, from 0 to {}", series.name, count - 1);
-        return Err(Failure::plain(message, "choose one of these"));
+        return Err(Failure::plain(message, "choose a frame in this range"));
     }
     Ok(frames)
 }

@@ -34,7 +34,7 @@ fn an_image_becomes_a_scene_with_walls_and_ties() {
     assert_eq!(output.code, 0, "{}", output.err);
     assert!(output.out.contains("wrote organ/scene.toml"), "{}", output.out);
     // The whole core is inside the ball.
-    assert!(output.out.contains("1.47 ml of the vessels; 0.00 ml of these run outside"), "{}", output.out);
+    assert!(output.out.contains("1.47 ml of vessels; 0.00 ml of vessels lie outside"), "{}", output.out);
     let text = workshop.read("organ/scene.toml");
     for piece in [
         "labels = [5], vessels = [8]",
@@ -89,7 +89,9 @@ fn an_image_becomes_a_scene_with_walls_and_ties() {
         "b.toml",
     ]);
     assert!(
-        none.code == 2 && none.err.contains("none of the masks") && none.err.contains("shell, core"),
+        none.code == 2
+            && none.err.contains("no mask has the number or name")
+            && none.err.contains("shell, core"),
         "{}",
         none.err
     );
@@ -150,7 +152,7 @@ fn groups_of_labels_are_one_material_each() {
     assert!(text.contains("label = { \"tissue\" = [5, 9], \"core\" = [\"6-8\"] }"), "{text}");
     assert_eq!(workshop.pliant(&["check", "organ"]).code, 0);
     let mixed = mesh(&workshop, &["--label", "a=5", "--label", "8", "--edge", "4mm", "-o", "b/scene.toml"]);
-    assert!(mixed.code == 2 && mixed.err.contains("either labels or groups"), "{}", mixed.err);
+    assert!(mixed.code == 2 && mixed.err.contains("mixes labels and groups"), "{}", mixed.err);
 }
 
 #[test]

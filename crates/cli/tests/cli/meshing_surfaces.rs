@@ -208,7 +208,7 @@ fn what_cannot_be_filled_is_refused_with_a_remedy() {
             ],
         ),
         ("plate.ply", &["--close-gaps", "2mm"], &["encloses nothing"]),
-        ("ball.ply", &["--label", "1", "--label", "2"], &["`--label` more than once is for images"]),
+        ("ball.ply", &["--label", "1", "--label", "2"], &["`--label` can be repeated for images only"]),
         ("ball.ply", &["--threshold", "1"], &["`--threshold` is for images"]),
         ("ball.ply", &["--series", "1.2"], &["`--series` is for images"]),
         (

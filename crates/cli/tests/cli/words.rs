@@ -148,7 +148,7 @@ fn what_would_be_ignored_or_is_no_label_image_is_refused() {
     let workshop = workshop();
     refused(
         &mesh(&workshop, &["seg.nii", "--add", "seg.nii", "--label", "1"]),
-        &["`--add` goes with `--threshold`", "labels are not"],
+        &["`--add` needs `--threshold`", "labels are not"],
     );
     refused(&mesh(&workshop, &["seg.nii", "--label", "1", "--threshold", "2"]), &["two ways"]);
     let scan = volume(
