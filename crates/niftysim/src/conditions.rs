@@ -247,8 +247,8 @@ impl ConditionReader<'_> {
             }
         }
         self.remarks.notes.push(format!(
-            "the tractions of line {}, one for each face, became forces on nodes, with the other sign, as NiftySim pulls \
-             against the vector; they do not grow with the area of the deformed faces",
+            "the tractions of line {}, one for each face, became forces on nodes with the opposite sign, as NiftySim pulls \
+             against the vector; these forces do not grow with the area of the deformed faces",
             line(of)
         ));
         let force = |(node, force)| self.on_nodes(of, Action::Force(force), shape, vec![node]);

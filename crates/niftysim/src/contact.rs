@@ -124,7 +124,7 @@ pub(super) fn read(
         reader
             .remarks
             .missing
-            .push("contact (KinematicContact: NiftySim's own guide does not tell what it means)".into());
+            .push("contact (KinematicContact: NiftySim's own guide does not explain it)".into());
     }
     Ok(Contact { things, bodies, margin })
 }
@@ -150,7 +150,7 @@ impl ContactReader<'_> {
             (themselves || is_on(of, "DoDeformableCollision")).then_some(Bodies { themselves, friction });
         if child(of, "RateConstraintDistance").is_some() {
             self.remarks.notes.push(
-                "RateConstraintDistance: NiftySim slows down what comes this near; the scene needs no such distance".into(),
+                "RateConstraintDistance: NiftySim slows down nodes that come this near; the scene needs no such distance".into(),
             );
         }
         Ok((margin, bodies))
@@ -189,11 +189,11 @@ impl ContactReader<'_> {
         let cosine = edges[0].dot(&edges[1]) / (lengths[0] * lengths[1]);
         if cosine.abs() > RECTANGLE {
             let angle = cosine.clamp(-1.0, 1.0).acos().to_degrees();
-            self.leave_out(of, &format!("its edges meet in {angle:.2}°, and plates are rectangles; move c"));
+            self.leave_out(of, &format!("its edges meet at {angle:.2}°, but plates are rectangles; move c"));
             return Ok(None);
         }
         self.note(
-            "ContactPlate: NiftySim's plate is a plane that pushes nodes to its front, also beyond its corner a; the scene's is a \
+            "ContactPlate: NiftySim's plate is a plane that pushes nodes to its front, also beyond its corner a; the scene's plate is a \
              box, as deep behind the plate as its shorter edge is long",
         );
         let x = edges[0] / lengths[0];
@@ -235,25 +235,25 @@ impl ContactReader<'_> {
             return Ok(None);
         }
         if growth > 0.0 && kind != "probe" {
-            self.note("RadChange: NiftySim's cylinder grows in radius alone; the scene's grows at its ends, too, by as much");
+            self.note("RadChange: NiftySim's cylinder grows in radius alone; the scene's cylinder grows by as much at its ends, too");
         }
         if (unit - 1.0).abs() > 1e-3 {
             let line = line(of);
             self.note(&format!(
-                "the axis of line {line} has the length {unit:.4}: it is taken as a direction only"
+                "the axis of line {line} has the length {unit:.4}: only its direction is used"
             ));
         }
         let form = match kind {
             "probe" => {
                 self.note(
-                    "ContactUSProbe: a shaft with a round tip; the scene's is round at its other end, too, by a radius \
+                    "ContactUSProbe: NiftySim's probe has one round tip; the scene's is also round at its other end, one radius \
                      behind `Origin`",
                 );
                 RigidForm::Capsule([radius, length])
             }
             _ => {
                 self.note(
-                    "ContactCylinder: NiftySim's has no ends, and nodes in it leave by its side; the scene's has flat ones",
+                    "ContactCylinder: NiftySim's has no ends, and nodes inside leave through its side; the scene's has flat ends",
                 );
                 RigidForm::Cylinder([radius, length])
             }
@@ -278,8 +278,8 @@ impl ContactReader<'_> {
             Ok((mesh, inside, depth)) => {
                 if let Some(depth) = depth {
                     self.remarks.notes.push(format!(
-                        "{name} is an open sheet: it got a thickness of {depth:.3e} m behind its front, to which its \
-                         triangles turn"
+                        "{name} is an open sheet: it got a thickness of {depth:.3e} m behind its front, the side that its \
+                         triangles face"
                     ));
                 }
                 RigidForm::Mesh { mesh, inside }
@@ -306,8 +306,8 @@ impl ContactReader<'_> {
                 Some("Rotation") => {
                     let [x, y, z, centre @ ..] = numbers_of::<6>(motion, "numbers of a rotation")?;
                     if [x, y, z] == [0.0; 3] {
-                        let what = "the first three numbers are the angles [rad] in NiftySim's code, the others the \
-                                    centre, and these angles are all 0"
+                        let what = "NiftySim's code reads the first three numbers as angles [rad] and the others as the \
+                                    centre, but these angles are all 0"
                             .to_owned();
                         let remedy = "give the angles first, or leave the rotation out";
                         return Err(fault(motion, ImportProblem::Contradiction { what, remedy }));
@@ -379,7 +379,7 @@ fn thing(
 ) -> Result<Thing, Fault> {
     let (at, turn): ([f64; 3], [f64; 3]) = (at.into(), turn.scaled_axis().into());
     if let Some(&value) = at.iter().chain(&turn).find(|x| !x.is_finite()) {
-        let (what, range) = ("a coordinate of its frame", "a number that can be computed with");
+        let (what, range) = ("a coordinate of its frame", "finite");
         return Err(fault(of, ImportProblem::OutOfRange { what, value, range }));
     }
     Ok(Thing { line: line(of), kind, form, at, turn, motion, growth: 0.0, nodes, friction: 0.0, margin: 0.0 })

@@ -128,7 +128,7 @@ pub enum ImportProblem {
     #[error("{0}")]
     Mesh(Box<MeshFileError>),
     /// There is nothing to simulate.
-    #[error("the model has no solid elements; models of shells alone can't be imported yet")]
+    #[error("the model has no solid elements; models of shells alone cannot be imported yet")]
     NothingSolid,
 }
 

@@ -186,7 +186,7 @@ impl Model {
             for of in submodel.children().filter(ignored) {
                 let (name, line) = (of.tag_name().name(), line(of));
                 missing.push(format!(
-                    "contact ({name} of line {line}, in a submodel, where NiftySim does not look)"
+                    "contact ({name} of line {line}, in a submodel, where NiftySim ignores it)"
                 ));
             }
         }
@@ -224,7 +224,7 @@ const CONTACT: [&str; 5] =
 
 fn mixed(of: XmlElement<'_>, first: geometry::Solid, other: geometry::Solid) -> Fault {
     let what = format!("this submodel has elements {}, an earlier one {}", other.name(), first.name());
-    let problem = ImportProblem::Contradiction { what, remedy: "NiftySim takes one type for all" };
+    let problem = ImportProblem::Contradiction { what, remedy: "use one type of element in all submodels" };
     fault(of, problem)
 }
 
@@ -276,7 +276,7 @@ impl Sets {
             for member in members {
                 if self.0[member as usize].replace((index as u32, density)).is_some() {
                     let what = format!("element {member} is in two sets");
-                    let problem = ImportProblem::Contradiction { what, remedy: "leave it in one of them" };
+                    let problem = ImportProblem::Contradiction { what, remedy: "keep it in one set" };
                     return Err(fault(set, problem));
                 }
             }

@@ -92,7 +92,7 @@ impl RigidSurface {
     pub fn solid(self) -> Result<(Mesh, bool, Option<f64>), String> {
         let Self { points, triangles } = self.welded();
         if triangles.is_empty() {
-            return Err("none of its triangles has three corners apart; give it an area".into());
+            return Err("all its triangles are degenerate; give it an area".into());
         }
         // Number of times that each edge is passed, from the smaller to the larger node and back.
         let mut edges: BTreeMap<[u32; 2], [u32; 2]> = BTreeMap::new();
@@ -104,7 +104,7 @@ impl RigidSurface {
         let shared = edges.values().filter(|[there, back]| *there > 1 || *back > 1).count();
         if shared > 0 {
             return Err(format!(
-                "{shared} of its edges lie between triangles that turn to different sides, or between more than two; turn \
+                "{shared} of its edges lie between triangles that turn to different sides, or between more than two triangles; turn \
                  all triangles to the side of the nodes"
             ));
         }

@@ -76,7 +76,7 @@ pub(super) fn read(
         .trim();
     if geometry.solid == Solid::H8 || kind == "Q4" {
         remarks.missing.push(format!(
-            "the shells of line {} (on quads; a scene's membranes of NiftySim are triangles on tets)",
+            "the shells of line {} (on quads; imported membranes must be triangles on tets)",
             line(elements)
         ));
         return Ok(Vec::new());
@@ -88,7 +88,7 @@ pub(super) fn read(
         let members = members(set, triangles.len())?;
         if kind == "SURFACE" && members.len() < triangles.len() {
             remarks.missing.push(format!(
-                "the shells of line {} (a part of the surface, whose triangles only NiftySim counts; list them with \
+                "the shells of line {} (a part of the surface, whose triangle numbers only NiftySim knows; list them with \
                  Type=\"T3\")",
                 line(set)
             ));
@@ -98,7 +98,7 @@ pub(super) fn read(
         for &member in &members {
             if std::mem::replace(&mut taken[member as usize], true) {
                 let what = format!("shell element {member} is in two sets");
-                let problem = ImportProblem::Contradiction { what, remedy: "leave it in one of them" };
+                let problem = ImportProblem::Contradiction { what, remedy: "keep it in one set" };
                 return Err(fault(set, problem));
             }
         }

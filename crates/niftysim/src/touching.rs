@@ -72,14 +72,14 @@ impl Touching {
                 if chosen.is_empty() {
                     let (line, own) = (thing.line, own.len());
                     writer.missing.push(format!(
-                        "contact (the thing of line {line} with `{body}`: no face has all of its nodes among the {own} \
-                         that touch; list those of whole faces)"
+                        "contact (the object of line {line} with `{body}`: no face has all its nodes among the {own} \
+                         listed nodes; list all nodes of each face)"
                     ));
                     continue;
                 }
                 if covered.len() < own.len() {
                     writer.notes.push(format!(
-                        "`{set}`: faces touch, and {} of {} listed nodes are on no face whose nodes are all listed",
+                        "`{set}`: only whole faces touch, but {} of {} listed nodes are on no face whose nodes are all listed",
                         own.len() - covered.len(),
                         own.len()
                     ));
@@ -118,7 +118,7 @@ impl Touching {
         }
         if !any {
             writer.note(
-                "DoDeformableCollision: the model is of one piece, and nothing else is there to be touched; \
+                "DoDeformableCollision: the model is one piece, and it has nothing else to touch; \
                  DoSelfCollision lets it touch itself",
             );
         }

@@ -182,7 +182,7 @@ impl Writer {
         if found.inside > 0 {
             let inside = found.inside;
             self.missing.push(format!(
-                "{inside} of the shells of line {line} (no faces of the boundary, where a body's membranes lie)"
+                "{inside} of the shells of line {line} (not on the boundary, where membranes must lie)"
             ));
         }
         if found.outside == 0 {
@@ -190,8 +190,8 @@ impl Writer {
         }
         if matches!(law, MembraneLaw::Linear(_)) {
             self.note(
-                "membranes Linear: NiftySim's are linear in the displacements, with axes that do not turn; the scene's \
-                 are nearly the same for small ones only, and right for large ones",
+                "membranes Linear: NiftySim's are linear in the displacements, with axes that do not turn; the scene's agree \
+                 for small displacements, and are right for large ones, too",
             );
         }
         self.line(format!("[law.{name}]"));
@@ -263,7 +263,7 @@ impl Writer {
         let found = add_faces(mesh, solid, set, &condition.faces);
         if found.inside > 0 {
             let (inside, line) = (found.inside, condition.line);
-            self.missing.push(format!("{inside} faces of line {line}, which became inner ones"));
+            self.missing.push(format!("{inside} faces of line {line}, which are no longer on the boundary"));
         }
         match found {
             Faces { outside: 0, .. } => None,
@@ -287,16 +287,16 @@ impl Writer {
             Action::Gravity(acceleration) => self.line(format!("acceleration = {}", vector(acceleration))),
             Action::Pressure(pressure) => {
                 self.note(
-                    "Pressure: NiftySim takes areas and normals of the step before, the scene those of the instant",
+                    "Pressure: NiftySim takes areas and normals of the step before, the scene takes the current ones",
                 );
                 self.line(format!("pressure = {pressure:?}"));
             }
             Action::Traction(traction) => {
                 self.note(
-                    "Traction: NiftySim pulls against the vector that it is given; the scene's has the other sign",
+                    "Traction: NiftySim pulls against the given vector; the scene's vector has the opposite sign",
                 );
                 self.note(
-                    "Traction: NiftySim's grows with the area of the deformed faces, the scene's does not",
+                    "Traction: NiftySim's force grows with the area of the deformed faces, the scene's force does not",
                 );
                 self.line(format!("traction = {}", vector(traction)));
             }
@@ -326,7 +326,7 @@ impl Writer {
         let has = |name: &str| output.is_some_and(|output| output.variables.iter().any(|v| v == name));
         let every = match output {
             Some(output) => {
-                self.note("NiftySim's outputs are those of one step later than their number says: its last is the scene's last");
+                self.note("NiftySim's outputs are one step later than their number says: its last output is the scene's last");
                 output.every as f64 * self.system.step
             }
             None => {
@@ -354,7 +354,7 @@ impl Writer {
         if has("F") || has("EKin") || has("EStrain") {
             if has("F") {
                 self.note(
-                    "F: the forces that hold constraints are written, not the forces inside of every node",
+                    "F: the scene writes the forces that hold constraints, not the internal forces of every node",
                 );
             }
             self.line("[output.table]".into());
@@ -379,7 +379,7 @@ impl Writer {
             scene,
             "\n[scene]\ntitle = \"{stem}\"\nuntil = {until:?}  # the total time {total:?} s and NiftySim's last step\n\n\
              [run]\nprecision = \"single\"  # as NiftySim\nstep = {step:?}\n\
-             on-unstable = \"report\"  # NiftySim goes on at the same step\n\n"
+             on-unstable = \"report\"  # NiftySim continues at the same step\n\n"
         );
         for (index, law) in self.laws.iter().enumerate() {
             let _ = writeln!(scene, "[law.material-{index}]\n{}\n", law.lines().join("\n"));

@@ -48,8 +48,8 @@ impl Writer {
                 let excess = s * s * s * (10.0 - s * (15.0 - 6.0 * s)) - 1.0;
                 if excess > TOLD_EXCESS {
                     self.note(&format!(
-                        "POLY345: in the one step after the total time NiftySim's load grows on by {excess:.1e} of it, the \
-                         scene's holds"
+                        "POLY345: in the one step after the total time NiftySim's load still grows, by a fraction {excess:.1e}; the \
+                         scene's load does not"
                     ));
                 }
                 self.line("curve = \"polynomial-10-15-6\"".into());
@@ -74,7 +74,7 @@ impl Writer {
                     return;
                 }
                 self.line(format!(
-                    "from = {:?}  # half a step: NiftySim's is there after the first one",
+                    "from = {:?}  # half a step: NiftySim applies it after its first step",
                     0.5 * self.system.step
                 ));
             }

@@ -140,7 +140,7 @@ pub(super) fn mistakes_of_contact_and_membranes_are_named() {
         }
     }
     let left_out: &[(&str, &str, &str)] = &[
-        ("<c>2 -0.5 -1</c>", "<c>2 -0.5 0</c>", "its edges meet in 71.57°, and plates are rectangles"),
+        ("<c>2 -0.5 -1</c>", "<c>2 -0.5 0</c>", "its edges meet at 71.57°, but plates are rectangles"),
         (
             "<RadChange>0<",
             "<RadChange>-0.05<",
@@ -156,9 +156,9 @@ pub(super) fn mistakes_of_contact_and_membranes_are_named() {
         (
             "<SlvNodes NumNodes=\"3\">0 1 3",
             "<SlvNodes NumNodes=\"2\">0 3",
-            "no face has all of its nodes among the 2",
+            "no face has all its nodes among the 2",
         ),
-        ("NumEls=\"1\">0 1 3", "NumEls=\"1\">0 1 2", "no faces of the boundary"),
+        ("NumEls=\"1\">0 1 3", "NumEls=\"1\">0 1 2", "not on the boundary"),
         ("\"NeoHookean\">500", "\"LinearThickShell\">500 1", "LinearThickShell bends"),
     ];
     for (from, to, expected) in left_out {
@@ -172,5 +172,5 @@ pub(super) fn mistakes_of_contact_and_membranes_are_named() {
     }
     let one_piece = with("")
         .replace("</SystemParams>", "<DoDeformableCollision>1</DoDeformableCollision></SystemParams>");
-    assert_note(&imported(&one_piece), "the model is of one piece");
+    assert_note(&imported(&one_piece), "the model is one piece");
 }
