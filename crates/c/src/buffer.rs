@@ -98,11 +98,11 @@ impl PliantBuffer {
         };
         let size = components * number;
         if self.stride != 0 && self.stride < size {
-            let message = format!("the buffer's stride is {} bytes, an item has {size}", self.stride);
+            let message = format!("the buffer's stride is {} bytes, but an item has {size}", self.stride);
             return Err(Fault::new(PliantStatus::ShortBuffer, message));
         }
         if self.count < items {
-            let message = format!("the buffer has room for {} items, {items} are needed", self.count);
+            let message = format!("the buffer has room for {} items, but {items} are needed", self.count);
             return Err(Fault::new(PliantStatus::ShortBuffer, message));
         }
         if items > 0 {

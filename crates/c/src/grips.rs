@@ -12,14 +12,14 @@ impl Running {
     /// Holds a combination of nodes at its present place, with the given stiffness or the largest stable one.
     fn take(&mut self, nodes: Vec<(u32, f64)>, stiffness: f64) -> Result<u32, Fault> {
         if stiffness.is_nan() || stiffness <= 0.0 {
-            let message = format!("`stiffness` is {stiffness}: it is above 0, or infinite for a pin");
+            let message = format!("`stiffness` is {stiffness}: it must be above 0; infinity makes a pin");
             return Err(Fault::new(PliantStatus::NotANumber, message));
         }
         self.see_places()?;
         let mut grip = Grip { nodes, ..Grip::default() };
         grip.stiffness = stiffness.min(self.simulation.stiffest(&grip));
         if !(grip.stiffness.is_finite() && grip.stiffness > 0.0) {
-            let message = "these nodes can't be held: they are of several participants, or a stiffness is needed that is not infinite";
+            let message = "these nodes cannot be held: they belong to several participants, or the solver needs a finite `stiffness`";
             return Err(Fault::new(PliantStatus::Unsupported, message));
         }
         [grip.place, _] = self.simulation.pulled(&grip);
@@ -55,7 +55,7 @@ pub unsafe extern "C" fn pliant_grip_nodes(
             let nodes = array(nodes, count, "nodes")?;
             let all = own.nodes();
             if count == 0 || nodes.iter().any(|&node| node as usize >= all) {
-                let message = format!("a grip holds at least one node, from 0 to {}", all - 1);
+                let message = format!("a grip needs at least one node, with numbers from 0 to {}", all - 1);
                 return Err(Fault::new(PliantStatus::Unknown, message));
             }
             let same = vec![1.0; count];
@@ -63,7 +63,7 @@ pub unsafe extern "C" fn pliant_grip_nodes(
             finite(weights, "weights")?;
             let sum: f64 = weights.iter().sum();
             if weights.iter().any(|&weight| weight < 0.0) || sum <= 0.0 || !sum.is_finite() {
-                let message = "weights are at least 0, not all of them are, and their sum is finite";
+                let message = "`weights` must be at least 0, with a sum that is finite and above 0";
                 return Err(Fault::new(PliantStatus::NotANumber, message));
             }
             let mut held: Vec<(u32, f64)> =
@@ -100,7 +100,7 @@ pub unsafe extern "C" fn pliant_grip_surface(
             let point: [f64; 3] = numbers(point, "point")?;
             finite(&[radius], "radius")?;
             if radius < 0.0 {
-                return Err(Fault::new(PliantStatus::NotANumber, "`radius` is at least 0"));
+                return Err(Fault::new(PliantStatus::NotANumber, "`radius` must be at least 0"));
             }
             own.see_places()?;
             own.surface(surface)?;

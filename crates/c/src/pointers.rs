@@ -115,7 +115,7 @@ pub(crate) unsafe fn give_bytes(
     if capacity < room {
         return Err(Fault::new(
             PliantStatus::ShortBuffer,
-            format!("the buffer has {capacity} bytes, {room} are needed"),
+            format!("the buffer has {capacity} bytes, but {room} are needed"),
         ));
     }
     // SAFETY: there is room for all bytes and the zero, and buffers of the caller and of the library do not

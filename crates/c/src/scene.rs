@@ -172,7 +172,7 @@ unsafe fn block(cells: &PliantCells, points: usize) -> Result<CellBlock, Fault> 
         PLIANT_HEXES => CellKind::Hex,
         other => {
             let message =
-                format!("there are no cells of the kind {other}: take PLIANT_TETS or another of its kind");
+                format!("cells cannot have the kind {other}: take PLIANT_TETS or another constant for cells");
             return Err(Fault::new(PliantStatus::BadCells, message));
         }
     };
@@ -180,7 +180,7 @@ unsafe fn block(cells: &PliantCells, points: usize) -> Result<CellBlock, Fault> 
     let nodes = unsafe { array(cells.nodes, cells.count.saturating_mul(kind.node_count()), "nodes")? };
     if let Some(at) = nodes.iter().position(|&node| node as usize >= points) {
         let (cell, node) = (at / kind.node_count(), nodes[at]);
-        let message = format!("cell {cell} has the node {node}, and there are {points} points");
+        let message = format!("cell {cell} has the node {node}, but there are only {points} points");
         return Err(Fault::new(PliantStatus::BadCells, message));
     }
     let mut block = CellBlock::new(kind, nodes.to_vec());

@@ -55,8 +55,9 @@ pub unsafe extern "C" fn pliant_simulation_open(
             let scene = context.scene(scene)?;
             let world = Arc::new(lock(&scene)?.world()?);
             if threads > MOST_THREADS {
-                let message =
-                    format!("`threads` is {threads}: at most {MOST_THREADS}, or 0 for those of the scene");
+                let message = format!(
+                    "`threads` is {threads}: it must be at most {MOST_THREADS}, or 0 for the number in the scene"
+                );
                 return Err(Fault::new(PliantStatus::Unsupported, message));
             }
             let threads = if threads == 0 { world.scene.run.threads as usize } else { threads as usize };
@@ -252,7 +253,7 @@ pub unsafe extern "C" fn pliant_push(
             finite(numbers, "forces")?;
             let (forces, nodes) = (numbers.as_chunks().0, own.nodes());
             if count > 0 && count != nodes {
-                let message = format!("{count} forces are given, {nodes} are needed: one a node");
+                let message = format!("{count} forces are given, but {nodes} are needed: one for each node");
                 return Err(Fault::new(PliantStatus::ShortBuffer, message));
             }
             own.simulation
@@ -294,7 +295,7 @@ pub unsafe extern "C" fn pliant_name(
         running(context, simulation, error, |own| {
             let names = names(own, kind)?;
             let Some(name) = names.get(index) else {
-                let message = format!("there are {} of this kind", names.len());
+                let message = format!("there are only {} of this kind", names.len());
                 return Err(Fault::new(PliantStatus::Unknown, message));
             };
             give_bytes(name.as_bytes(), buffer.cast(), capacity, length, true)
@@ -317,7 +318,8 @@ pub(crate) fn names(own: &Running, kind: u32) -> Result<Vec<String>, Fault> {
         PLIANT_TOOLS => contacts().flat_map(|all| &all.rigids).map(|own| own.tool()).collect(),
         PLIANT_WARNINGS => own.world.warnings().map(|warning| warning.message.as_str()).collect(),
         other => {
-            let message = format!("there is no kind {other} of names: take PLIANT_BODIES or another one");
+            let message =
+                format!("names have no kind {other}: take PLIANT_BODIES or another constant for names");
             return Err(Fault::new(PliantStatus::NotANumber, message));
         }
     };

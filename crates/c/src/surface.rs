@@ -106,7 +106,7 @@ pub unsafe extern "C" fn pliant_surface_triangles(
         running(context, simulation, error, |own| {
             let all = own.surface(surface)?.skin.triangles();
             if capacity < all.len() {
-                let message = format!("there is room for {capacity} triangles, {} are needed", all.len());
+                let message = format!("there is room for {capacity} triangles, but {} are needed", all.len());
                 return Err(Fault::new(PliantStatus::ShortBuffer, message));
             }
             needed(triangles, "triangles")?;

@@ -89,8 +89,9 @@ pub unsafe extern "C" fn pliant_nodes(
         running(context, simulation, error, |own| {
             let PliantNodes { first, count } = nodes(own, some_text(body, "body")?)?;
             if what > PLIANT_REST {
-                let message =
-                    format!("nodes have no values of the kind {what}: take PLIANT_POSITION or another one");
+                let message = format!(
+                    "node values have no kind {what}: take PLIANT_POSITION or another constant for nodes"
+                );
                 return Err(Fault::new(PliantStatus::NotANumber, message));
             }
             let writer = buffer.writer(count as usize)?;

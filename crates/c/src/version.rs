@@ -35,7 +35,7 @@ pub unsafe extern "C" fn pliant_context_open(
     let open = || {
         if abi != PLIANT_ABI {
             let message = format!(
-                "the program was built for version {abi} of the interface, this library has {PLIANT_ABI}"
+                "the program was built for version {abi} of the interface, but this library has {PLIANT_ABI}"
             );
             return Err(Fault::new(PliantStatus::Version, message));
         }

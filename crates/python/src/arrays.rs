@@ -32,12 +32,10 @@ pub fn array1<T: numpy::Element>(py: Python<'_>, values: Vec<T>) -> Bound<'_, Py
 /// Three numbers an item, from an array (n, 3) of any strides that Python has checked.
 pub fn vectors(array: &PyReadonlyArray2<'_, f64>) -> Result<Vec<[f64; 3]>, Trouble> {
     let [rows, columns] = array.shape() else {
-        return Err(Trouble::Value("an array (n, 3) is wanted".into()));
+        return Err(Trouble::Value("expected an array of shape (n, 3)".into()));
     };
     if *columns != 3 {
-        return Err(Trouble::Value(format!(
-            "an array of shape ({rows}, {columns}) is given, (n, 3) is wanted"
-        )));
+        return Err(Trouble::Value(format!("expected an array of shape (n, 3), found ({rows}, {columns})")));
     }
     if let Ok(numbers) = array.as_slice() {
         return Ok(numbers.as_chunks().0.to_vec());

@@ -114,7 +114,7 @@ impl Trouble {
             }
             Self::Device(message) => ("DeviceError", message),
             Self::Busy(message) => ("BusyError", message),
-            Self::Closed => ("ClosedError", "the simulation is closed; make another one".to_owned()),
+            Self::Closed => ("ClosedError", "the simulation is closed; make a new one".to_owned()),
             Self::Internal(message) => ("InternalError", message),
             Self::Value(message) => return Ok(pyo3::exceptions::PyValueError::new_err(message)),
         };

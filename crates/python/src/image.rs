@@ -45,14 +45,16 @@ impl Image {
         names: Vec<(i32, String)>,
     ) -> Result<Self, Trouble> {
         let known = NUMBERS.iter().find(|(word, _)| *word == numbers);
-        let (_, scalar) = known.ok_or_else(|| Trouble::Value(format!("images hold no {numbers}")))?;
+        let (_, scalar) =
+            known.ok_or_else(|| Trouble::Value(format!("images cannot hold numbers of type {numbers}")))?;
         let axes = Matrix3::from_fn(|row, column| affine[row][column]);
         let grid = Grid::new(dims, Vector3::from_fn(|row, _| affine[row][3]), axes)
             .map_err(|error| Trouble::Mesh(None, error.to_string()))?;
         let mut own = LabelNames::default();
         names.iter().for_each(|(label, name)| own.insert(*label, name));
         let image = pliant_imaging::Image::new(grid, *scalar, bytes, own);
-        let image = image.ok_or_else(|| Trouble::Value("an image has other bytes than voxels".into()))?;
+        let image =
+            image.ok_or_else(|| Trouble::Value("the bytes of an image do not match its voxels".into()))?;
         Ok(Self(Arc::new(image)))
     }
 

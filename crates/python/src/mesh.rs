@@ -86,7 +86,7 @@ impl Mesh {
                 let known: Vec<&str> =
                     KINDS.iter().map(|(word, _)| *word).chain(SPLIT.map(|(word, _)| word)).collect();
                 let known = known.join(", ");
-                return Err(Trouble::Value(format!("there are no cells `{word}`; there are {known}")));
+                return Err(Trouble::Value(format!("unknown kind of cells `{word}`; known kinds: {known}")));
             }
         }
         mesh.point_data.extend(point_data.iter().map(|(name, values)| (name.clone(), data(values))));

@@ -214,7 +214,8 @@ impl Running {
         }
         self.grips.clear();
         Err(Trouble::Value(
-            "the solver of this body knows no grips, or a grip holds nodes of several participants".into(),
+            "the solver of this body does not support grips, or a grip holds nodes of several participants"
+                .into(),
         ))
     }
 

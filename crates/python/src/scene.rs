@@ -46,7 +46,7 @@ impl Taken {
         if text.len() > LONGEST {
             let size = text.len() >> 20;
             return Err(Trouble::Value(format!(
-                "the text of the scene has {size} MiB, and 64 are the most; give large tables as meshes or files"
+                "the text of the scene has {size} MiB, but at most 64 are allowed; give large tables as meshes or files"
             )));
         }
         let images = images.into_iter().map(|(name, image)| (name, Arc::clone(&image.get().0))).collect();

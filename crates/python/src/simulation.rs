@@ -152,12 +152,12 @@ impl Slot {
     fn trouble(&self) -> Trouble {
         match self {
             Self::Here(_) | Self::Away => Trouble::Busy(
-                "the simulation computes for another call: one at a time, and no steps within callbacks"
+                "the simulation is busy with another call: make one call at a time, and take no steps within callbacks"
                     .into(),
             ),
             Self::Closed { .. } => Trouble::Closed,
             Self::Broken { message, .. } => {
-                Trouble::Internal(format!("the simulation ended with an internal error before: {message}"))
+                Trouble::Internal(format!("an earlier internal error ended the simulation: {message}"))
             }
         }
     }
@@ -347,7 +347,7 @@ impl Simulation {
             let nodes = running.nodes() as u32;
             if grips.iter().flat_map(|(nodes, ..)| nodes).any(|&(node, _)| node >= nodes) {
                 return Err(Trouble::Value(format!(
-                    "a grip names a node that is not there; there are {nodes}"
+                    "a grip names a node that does not exist; there are {nodes} nodes"
                 )));
             }
             let simulation = running.simulation();
@@ -376,7 +376,9 @@ impl Simulation {
     /// Drives a tool to a pose and its jaws to an angle [rad] within a time [s]: when they arrive [s].
     fn drive(&self, tool: &str, pose: Option<Posed>, opening: Option<f64>, within: f64) -> PyResult<f64> {
         let refused = || {
-            Trouble::Value("the quaternion of a pose has no length, or a number of it is not finite".into())
+            Trouble::Value(
+                "the quaternion of a pose has length 0, or a number of the pose is not finite".into(),
+            )
         };
         let pose = pose.map(|(place, turn)| pose_of(place, turn).ok_or_else(refused));
         let pose = pose.transpose()?;
@@ -476,7 +478,7 @@ impl Simulation {
 fn fill(out: &mut PyReadwriteArray2<'_, f64>, values: &[f64]) -> PyResult<()> {
     let mut out = out.as_array_mut();
     if out.len() != values.len() || out.ncols() != 3 {
-        let message = format!("`out` has shape {:?}, ({}, 3) is wanted", out.shape(), values.len() / 3);
+        let message = format!("`out` has shape {:?}, expected ({}, 3)", out.shape(), values.len() / 3);
         return Err(Trouble::Value(message).into());
     }
     out.iter_mut().zip(values).for_each(|(out, value)| *out = *value);

@@ -119,7 +119,7 @@ def test_calls_that_do_not_fit() -> None:
         (lambda: sim.run(every=-1.0), "apart"),
         (lambda: sim.picture(size=(0, 10)), "pixels"),
         (lambda: sim.drive("nothing", ((0, 0, 0), (0, 0, 0, 1))), "no tool"),
-        (lambda: sim.drive("nothing", ((0, 0, 0), (0, 0, 0, 0))), "no length"),
+        (lambda: sim.drive("nothing", ((0, 0, 0), (0, 0, 0, 0))), "length 0"),
         (lambda: sim.drive("nothing", np.ones((4, 4))), "rotation"),
     ]:
         with pytest.raises(ValueError, match=says):

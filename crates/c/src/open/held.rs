@@ -26,7 +26,7 @@ impl Held {
         match simulation.grip(&self.all()) {
             true => Ok(()),
             false => {
-                let message = "nothing can be held here: the solver knows no hands, or a grip has nodes of several participants";
+                let message = "nothing can be held here: the solver does not support grips, or a grip has nodes of several participants";
                 Err(Fault::new(PliantStatus::Unsupported, message))
             }
         }

@@ -282,7 +282,7 @@ int main(void) {
     OK(pliant_snapshot_bytes(context, snapshot, bytes, length, NULL, &error));
     PliantSnapshot read;
     EXPECT(pliant_snapshot_read(context, simulation, bytes, length - 1, &read, &error), PLIANT_STATUS_BAD_SNAPSHOT, "bytes instead");
-    EXPECT(pliant_snapshot_read(context, simulation, bytes, 3, &read, &error), PLIANT_STATUS_BAD_SNAPSHOT, "other bytes");
+    EXPECT(pliant_snapshot_read(context, simulation, bytes, 3, &read, &error), PLIANT_STATUS_BAD_SNAPSHOT, "no snapshot header");
     EXPECT(pliant_snapshot_read(context, simulation, NULL, 3, &read, &error), PLIANT_STATUS_NULL, "`bytes`");
     bytes[length / 2] ^= 1;
     EXPECT(pliant_snapshot_read(context, simulation, bytes, length, &read, &error), PLIANT_STATUS_BAD_SNAPSHOT, "damaged");
