@@ -70,7 +70,7 @@ fn an_image_becomes_a_scene_with_walls_and_ties() {
         (&["--capsule", "-1mm"], "a.toml", ["above 0", ""]),
         (&["--capsule", "1mm"], "a.vtu", ["`--capsule` is for a scene", "leave it out"]),
         (&["--vessels", "8=1mm"], "a.vtu", ["`--vessels` is for a scene", ""]),
-        (&["--as", "hexes"], "a.toml", ["of tets", "leave it out"]),
+        (&["--as", "hexes"], "a.toml", ["tissue with tets", "leave it out"]),
         (&[], "masks.toml", ["exists already", "--force"]),
     ] {
         let output = mesh(&workshop, &[&["--label", "5", "--edge", "4mm", "-o", out], given].concat());

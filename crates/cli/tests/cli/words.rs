@@ -150,7 +150,7 @@ fn what_would_be_ignored_or_is_no_label_image_is_refused() {
         &mesh(&workshop, &["seg.nii", "--add", "seg.nii", "--label", "1"]),
         &["`--add` needs `--threshold`", "labels are not"],
     );
-    refused(&mesh(&workshop, &["seg.nii", "--label", "1", "--threshold", "2"]), &["two ways"]);
+    refused(&mesh(&workshop, &["seg.nii", "--label", "1", "--threshold", "2"]), &["both choose voxels"]);
     let scan = volume(
         |[i, j, k]| if i < 5 { -1024 } else { ((i * 7919 + j * 104_729 + k * 1_299_709) % 901) as i16 },
     );

@@ -464,7 +464,7 @@ fn a_folder_that_does_not_hold_what_a_checkpoint_continues_is_refused() {
     workshop.write("out/case/history.csv", &history[..history.len() / 2]);
     refused(&workshop.resume("out/case", &[]), &[outputs, "history.csv", "at the checkpoint"]);
     workshop.write("out/case/history.csv", history.replacen("e-", "e+", 1));
-    refused(&workshop.resume("out/case", &[]), &[outputs, "not those of the interrupted run"]);
+    refused(&workshop.resume("out/case", &[]), &[outputs, "differ from the rows of the interrupted run"]);
     workshop.write("out/case/history.csv", &history);
     let frame = workshop.path("out/case/fields/000001.vtu");
     let content = fs::read(&frame).unwrap();

@@ -109,7 +109,7 @@ pub(super) fn traction_pulls_as_niftysim_pulls() {
                 <Magnitudes Type=\"UNIFORM\">0 0 5</Magnitudes></Constraint>";
     let imported = imported(&with(more));
     assert_lines(&imported, &["traction = [0.0, 0.0, -5.0]"]);
-    assert_note(&imported, "pulls against the vector");
+    assert_note(&imported, "pulls against the given vector");
     // Both tetrahedra have a side along y = 0.
     assert_eq!(imported.meshes[0].1.block(CellKind::Triangle).unwrap().len(), 2);
     build(&imported);
