@@ -538,7 +538,7 @@ def test_runs_without_an_end_are_refused(scene: pliant.Scene, tmp_path: object, 
         with pytest.raises(ValueError, match="until a time greater than 0"):
             model.run(out, until=until)
     if not np.isfinite(until):
-        with pytest.raises(ValueError, match="goes on to a time"):
+        with pytest.raises(ValueError, match="`until` must be a finite time"):
             model.simulate().run(until=until)
 
 

@@ -13,7 +13,7 @@ __all__ = ["fixed", "indices", "numbers", "shaped"]
 def _plain(value: ArrayLike, what: str) -> NDArray[Any]:
     array = np.asarray(value)
     if array.dtype.kind not in "biuf":
-        raise ValueError(f"{what} hold {array.dtype}, numbers are wanted")
+        raise ValueError(f"{what} must be numbers, not {array.dtype}")
     return array
 
 
@@ -47,7 +47,7 @@ def indices(value: ArrayLike, what: str, shape: tuple[int | None, ...], below: i
     if array.size and array.dtype.kind == "f" and not (array == np.floor(array)).all():
         raise ValueError(f"{what} are not whole numbers")
     if array.size and (array.min() < 0 or array.max() >= below):
-        raise ValueError(f"{what} name {int(array.min())} to {int(array.max())}, but there are 0 to {below - 1}")
+        raise ValueError(f"{what} are {int(array.min())} to {int(array.max())}, but must be 0 to {below - 1}")
     return np.ascontiguousarray(array, dtype=np.uint32)
 
 

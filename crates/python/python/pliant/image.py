@@ -53,7 +53,7 @@ class Image:
     def __init__(self, array: ArrayLike, affine: ArrayLike) -> None:
         values = np.asarray(array)
         if values.dtype.kind not in "biuf":
-            raise ValueError(f"an image holds {values.dtype}, numbers are wanted")
+            raise ValueError(f"an image must hold numbers, not {values.dtype}")
         if values.ndim != 3 or 0 in values.shape:
             raise ValueError(f"an image has shape {values.shape}, expected (i, j, k)")
         self.array: NDArray[Any] = fixed(np.array(values))
@@ -120,9 +120,9 @@ class Image:
         """Writes it as NIfTI-1 of 32-bit integers, the affine matrix in millimetres (`sform`). Values are rounded as for a mesh."""
         whole = np.rint(self.array)
         if not bool((np.abs(whole - self.array) <= 1e-4).all()) or float(np.abs(whole).max()) >= 2**31:
-            raise ValueError("the image holds other values than whole numbers below 2³¹: labels are wanted")
+            raise ValueError("the values of an image must be labels: whole numbers below 2³¹")
         if max(self.array.shape) >= 2**15:
-            raise ValueError(f"NIfTI-1 takes 32,767 voxels along an axis at most, not {max(self.array.shape)}")
+            raise ValueError(f"NIfTI-1 allows at most 32,767 voxels along an axis, not {max(self.array.shape)}")
         header = bytearray(352)
         struct.pack_into("<i", header, 0, 348)
         struct.pack_into("<8h", header, 40, 3, *self.array.shape, 1, 1, 1, 1)

@@ -78,7 +78,7 @@ class Mesh:
         blocks = []
         for kind, corners in cells.items():
             if kind not in _CORNERS:
-                raise ValueError(f"there are no cells `{kind}`; there are {', '.join(_CORNERS)}")
+                raise ValueError(f"unknown kind of cells `{kind}`; known kinds: {', '.join(_CORNERS)}")
             blocks.append((kind, indices(corners, f"corners of `{kind}`", (None, _CORNERS[kind]), count)))
         total = sum(len(corners) for _, corners in blocks)
         by_point = [(name, _columns(values, f"point data `{name}`", count)) for name, values in (point_data or {}).items()]
@@ -455,7 +455,7 @@ def _of_gmsh(cell_data: dict[str, NDArray[Any]], point_data: dict[str, NDArray[A
 def _columns(values: ArrayLike, what: str, count: int) -> NDArray[np.float64]:
     array = np.asarray(values)
     if array.dtype.kind not in "biuf":
-        raise ValueError(f"{what} hold {array.dtype}, numbers are wanted")
+        raise ValueError(f"{what} must be numbers, not {array.dtype}")
     if array.shape[:1] != (count,):
         raise ValueError(f"{what} have shape {array.shape}, expected ({count}, …)")
     return np.ascontiguousarray(array.reshape(count, -1), dtype=np.float64)

@@ -257,7 +257,7 @@ class Model:
             text, time, energies = self._own.run(os.fspath(out), all_options, told if each or stop else None)
         except KeyboardInterrupt as interrupt:
             if "checkpoint" in self._scene.run_table and hasattr(interrupt, "add_note"):
-                interrupt.add_note(f"`run({os.fspath(out)!r}, resume=True)` goes on from the last checkpoint")
+                interrupt.add_note(f"`run({os.fspath(out)!r}, resume=True)` continues from the last checkpoint")
             raise
         units = {"time": "s", **dict(self._own.columns())}
         return Result._of_files(json.loads(text), time, energies, os.fspath(out), units)
@@ -363,7 +363,7 @@ def _get(body: Any, key: str) -> Any:
 def _check_threads(threads: int) -> None:
     """Raises `ValueError` for a number of threads that no scene may have either."""
     if not 0 <= threads <= _MOST_THREADS:
-        raise ValueError(f"threads: {threads}, where 0 (all cores) to {_MOST_THREADS} are possible")
+        raise ValueError(f"`threads` is {threads}: it must be from 0 (all cores) to {_MOST_THREADS}")
 
 
 def _doubt(result: Result) -> None:

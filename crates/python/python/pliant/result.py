@@ -193,7 +193,7 @@ class Result:
             series = [path for path in series if os.path.basename(path) == f"{output}.pvd"]
         if len(series) != 1:
             known = ", ".join(os.path.basename(path)[:-4] for path in self.files if path.endswith(".pvd"))
-            raise ValueError(f"which series? The run has written {known or 'none'}")
+            raise ValueError(f"name one series as `output`; the run has written {known or 'no series'}")
         import xml.etree.ElementTree as tree
 
         for entry in tree.parse(series[0]).iter("DataSet"):

@@ -117,7 +117,7 @@ class Scene:
     def _tables(self, kind: str) -> MutableMapping[str, Any]:
         own = self._data.setdefault(kind, {})
         if not isinstance(own, MutableMapping):
-            raise TypeError(f"`{kind}` of the scene is no table")
+            raise TypeError(f"`{kind}` of the scene is not a table")
         return own
 
     @property
@@ -359,7 +359,7 @@ def load(path: str | os.PathLike[str], *, set: Mapping[str, object] | None = Non
 def _path(key: str) -> list[str]:
     parts = key.split(".")
     if not all(parts):
-        raise KeyError(f"`{key}` is no path of a value, such as law.tissue.young-modulus")
+        raise KeyError(f"`{key}` is not the path of a value, such as law.tissue.young-modulus")
     return parts
 
 
@@ -382,7 +382,7 @@ def _inner(own: Any, part: str, key: str) -> Any:
     elif isinstance(inner, (tuple, np.ndarray)):
         inner = list(inner)
     elif not isinstance(inner, (list, MutableMapping)):
-        raise KeyError(f"`{key}` lies in a value that is no table")
+        raise KeyError(f"`{key}` lies inside a value that is not a table")
     own[at] = inner
     return inner
 

@@ -97,7 +97,7 @@ class State:
                 parts = [file[f"part{k}"].tobytes() for k in range(sum(name.startswith("part") for name in file.files))]
                 return _state(parts, float(file["time"]), int(file["steps"]), file["moved"].tolist())
         except (KeyError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-            raise ResumeError(f"`{os.fspath(path)}` is no state of a simulation: {error}", path=os.fspath(path)) from error
+            raise ResumeError(f"`{os.fspath(path)}` is not a state of a simulation: {error}", path=os.fspath(path)) from error
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _state, self._own.encoded()
@@ -255,7 +255,7 @@ class Simulation:
         if out is None:
             return np.empty(shape)
         if out.dtype != np.float64 or out.shape != shape or not out.flags.writeable:
-            raise ValueError(f"`out` has shape {out.shape} of {out.dtype}, a writeable one of {shape} of float64 is expected")
+            raise ValueError(f"`out` has shape {out.shape} and type {out.dtype}; expected a writeable float64 array of shape {shape}")
         return out
 
     def field(self, name: str, *, on: str | None = None, at: Literal["points", "cells"] | None = None) -> NDArray[np.float64]:
@@ -357,7 +357,7 @@ class Simulation:
         """Goes so many steps on; the steps done, fewer where the run ends before."""
         number = operator.index(count)
         if number < 0:
-            raise ValueError(f"{count} steps can't be taken")
+            raise ValueError(f"the number of steps must be at least 0, not {count}")
         self._free()
         return self._own.advance(number, None)
 
@@ -385,7 +385,7 @@ class Simulation:
         self._free()
         end = self._model._scene.until if until is None else float(until)
         if not math.isfinite(end):
-            raise ValueError(f"a run goes on to a time, not to {end} s")
+            raise ValueError(f"`until` must be a finite time, not {end} s")
         history = self._history([record] if isinstance(record, str) else record)
         try:
             self._run_into(history, end, each, every)
@@ -412,7 +412,7 @@ class Simulation:
         if until <= self.time:
             every = math.inf
         if not every > 0.0:
-            raise ValueError(f"samples can't be {every} s apart")
+            raise ValueError(f"`every` must be greater than 0, not {every} s")
         start, count = self.time, 0
         while True:
             history._add(self.time, self._own.sample(), {name: self._recorded(name) for name in history._fields})
@@ -441,7 +441,7 @@ class Simulation:
 
     def _free(self) -> None:
         if self._calling:
-            raise BusyError("a callback of `run` reads, pulls and sets; `run` itself takes steps, and goes back to no snapshot")
+            raise BusyError("a callback of `run` may read, pull and set; it must not take steps or restore a snapshot")
 
     def push(self, forces: ArrayLike | None, *, body: str | None = None) -> None:
         """Forces on all nodes [N], (nodes, 3), or on those of a body; they stay until replaced. `None` ends them."""
@@ -485,9 +485,9 @@ class Simulation:
             Of its spring [N/m]; less, where steps would not be stable.
         """
         if (at is None) == (nodes is None):
-            raise ValueError("a grip takes a place or nodes, one of them")
+            raise ValueError("give a grip either a place or nodes")
         if not stiffness > 0.0:
-            raise ValueError(f"a grip of {stiffness} N/m holds nothing")
+            raise ValueError(f"`stiffness` of a grip must be greater than 0, not {stiffness} N/m")
         if nodes is not None:
             own = indices(nodes, "nodes of a grip", (None,), len(self._model.rest))
             if not len(own):
@@ -516,7 +516,7 @@ class Simulation:
         scene = self._model._scene.replace(dict(values))
         model = scene.build(like=self._model)
         if not self._own.exchange(model._own):
-            raise ValueError(f"{', '.join(values)}: the mesh, the solver or the precision would be another; build a new model")
+            raise ValueError(f"{', '.join(values)} would change the mesh, the solver or the precision; build a new model")
         self._model = model
         # Steps of another length are stable with other stiffnesses.
         self._hold()
@@ -572,7 +572,7 @@ class Simulation:
         from pliant.pictures import Picture
 
         if len(size) != 2 or not all(1 <= int(n) <= 8192 for n in size):
-            raise ValueError(f"a picture of {size} pixels can't be drawn; each side has 1 to 8192")
+            raise ValueError(f"`size` is {size} pixels; each side must have 1 to 8192")
         png = self._own.picture(field, [int(size[0]), int(size[1])], None if camera is None else list(camera))
         return Picture(bytes(png))
 
@@ -614,7 +614,7 @@ def _pose(pose: Any) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
     matrix = numbers(array, "the pose of a tool", (4, 4))
     turn = matrix[:3, :3]
     if not np.allclose(turn @ turn.T, np.eye(3), atol=1e-6) or np.linalg.det(turn) < 0.0:
-        raise ValueError("the pose of a tool turns without stretching: its 3 × 3 part must be a rotation")
+        raise ValueError("the 3 × 3 part of the pose of a tool must be a rotation, without stretching")
     return matrix[:3, 3], _quaternion(turn)
 
 

@@ -72,13 +72,13 @@ class Sweep:
         axes = {key: list(dict.fromkeys(row[key] for row in texts)) for key in self.keys}
         shape = tuple(len(own) for own in axes.values())
         if math.prod(shape) != len(self.rows):
-            raise ValueError("these runs are no grid of values; `to_pandas` has them as a table")
+            raise ValueError("these runs do not form a grid of values; use `to_pandas` for a table")
         names = [name for name in _columns(self.rows, self.keys) if name not in ("run", *self.keys, *_TOLD)]
         data = {}
         for name in names:
             there = [np.asarray(row[name]) for row in self.rows if name in row]
             if len({own.shape for own in there}) != 1:
-                raise ValueError(f"`{name}` has other shapes from run to run; `to_pandas` has them as a table")
+                raise ValueError(f"the shape of `{name}` differs between runs; use `to_pandas` for a table")
             own = np.array([row.get(name, np.full(there[0].shape, math.nan)) for row in self.rows])
             dims = [*axes, *(f"{name}_{k}" for k in range(1, own.ndim))]
             data[name] = (dims, own.reshape(shape + own.shape[1:]))
@@ -189,7 +189,7 @@ def sweep(
     if keep == "all" and out is None:
         raise ValueError("to keep the outputs of all runs, give a folder `out`")
     if retry not in (None, "failed"):
-        raise ValueError(f"`retry` is None or 'failed', not {retry!r}")
+        raise ValueError(f"`retry` must be None or 'failed', not {retry!r}")
     folder = None if out is None else os.path.abspath(os.fspath(out))
     bundle = _bundle(scene, combinations, keys, measure, cores, folder if keep == "all" else None)
     rows: dict[int, dict[str, Any]] = {}
@@ -264,7 +264,7 @@ def _combinations(values: Any) -> tuple[list[dict[str, Any]], list[str]]:
     rows = [{str(key): _number(value) for key, value in row.items()} for row in values]
     keys = list(dict.fromkeys(key for row in rows for key in row))
     if any(list(row) != keys for row in rows):
-        raise ValueError("the runs of a sweep set the same values, in the same order")
+        raise ValueError("all runs of a sweep must set the same values in the same order")
     return rows, keys
 
 
@@ -397,7 +397,7 @@ def _jsonable(value: Any) -> Any:
 
 def _take(row: dict[str, Any], rows: dict[int, dict[str, Any]], bundle: _Bundle) -> None:
     if row["version"] != bundle.version:
-        message = f"a worker on {row['host']} has version {row['version']} of pliant, and this is {bundle.version}"
+        message = f"a worker on {row['host']} has version {row['version']} of pliant, but this process has {bundle.version}; install the same version there"
         raise ClusterError(message, hosts=[row["host"]])
     rows[int(row["run"])] = row
 

@@ -81,4 +81,4 @@ def engine_of(on: Any, cores: int, gpus: float, retries: int) -> Engine:
         from pliant.engines.ray import Ray
 
         return Ray(cores, gpus, retries)
-    raise ClusterError(f"there is no engine {on!r}; there are 'local', 'dask', 'ray', clients of Dask and executors")
+    raise ClusterError(f"there is no engine {on!r}; take 'local', 'dask', 'ray', a client of Dask or an executor")
