@@ -1,7 +1,7 @@
 """Real-time simulation of soft organs.
 
-A `Scene` says what is simulated, as plain data. It is built into a `Model`, which is constant and shared, and simulated by a
-`Simulation`, which is under way. SI units throughout: m, kg, s, Pa, N.
+A `Scene` describes the bodies and the run, as plain data. It is built into a `Model`, which is constant and shared, and a
+`Simulation` runs the model. SI units throughout: m, kg, s, Pa, N.
 
 >>> import pliant
 >>> scene = pliant.Scene.of_mesh(pliant.Mesh.block([0.1, 0.05, 0.05], edge=0.025))

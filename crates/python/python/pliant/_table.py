@@ -1,4 +1,4 @@
-"""What all classes of `pliant.tables` have."""
+"""The base class of all classes of `pliant.tables`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ __all__ = ["Table"]
 
 
 class Table:
-    """A table of a scene. Keys are those of the file, with underscores for hyphens; what is `None` is left out."""
+    """A table of a scene. Keys are those of the file, with underscores for hyphens; keys that are `None` are left out."""
 
     _type: ClassVar[str | None] = None
     _keys: ClassVar[dict[str, str]] = {}

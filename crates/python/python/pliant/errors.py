@@ -1,4 +1,4 @@
-"""What can go wrong, each with its place. Every error is also the built-in exception that Python users expect.
+"""Errors of Pliant, each with its place. Every error is also the built-in exception that Python users expect.
 
 >>> issubclass(SceneError, ValueError) and issubclass(SceneError, Error)
 True
@@ -79,14 +79,14 @@ def _again(kind: type[Error], message: str, fields: dict[str, Any]) -> Error:
 
 
 class SceneError(Error, ValueError):
-    """A scene has mistakes: `diagnostics` has all of them, and the text shows the lines."""
+    """A scene with mistakes: `diagnostics` lists all mistakes, and the text shows the lines."""
 
     _fields: tuple[str, ...] = ("diagnostics",)
     diagnostics: Sequence[Diagnostic]
 
 
 class MeshError(Error, ValueError):
-    """A mesh or an image that can't be read, repaired or meshed."""
+    """A mesh or an image that cannot be read, repaired or meshed."""
 
     _fields: tuple[str, ...] = ("path", "line", "place")
     path: str | None
@@ -95,7 +95,7 @@ class MeshError(Error, ValueError):
 
 
 class SimulationError(Error, RuntimeError):
-    """A simulation that can't go on. It stays at the last good instant; `time` is in s. Of `Simulation.run`, `history` has the samples until then."""
+    """A simulation that cannot continue. It stays at the last good instant; `time` is in s. After `Simulation.run`, `history` has the samples until then."""
 
     _fields: tuple[str, ...] = ("kind", "body", "element", "node", "time")
     kind: str
@@ -107,7 +107,7 @@ class SimulationError(Error, RuntimeError):
 
 
 class UnstableError(SimulationError):
-    """A step was too long, an element inverted, or energy came from nowhere."""
+    """A step that was too long, an inverted element, or energy from nowhere."""
 
 
 class ConvergenceError(SimulationError):
@@ -119,7 +119,7 @@ class ConvergenceError(SimulationError):
 
 
 class BlockedError(ConvergenceError):
-    """A tool or moved nodes that can't go on since something is in their way: `driver` is the name, `force` what it pushed with last, in N."""
+    """A tool or moved nodes with something in their way: `driver` is their name, `force` their last push [N]."""
 
     _fields: tuple[str, ...] = (*ConvergenceError._fields, "driver", "force")
     driver: str | None
@@ -127,14 +127,14 @@ class BlockedError(ConvergenceError):
 
 
 class DeviceError(Error, RuntimeError):
-    """No graphics adapter can do what was asked for; the text names the packages to install."""
+    """No graphics adapter fits the request; the text names the packages to install."""
 
     _fields: tuple[str, ...] = ("adapter",)
     adapter: str | None
 
 
 class OutputError(Error, OSError):
-    """A file or folder that can't be written."""
+    """A file or folder that cannot be written."""
 
     _fields: tuple[str, ...] = ("path",)
     path: str | None
@@ -148,7 +148,7 @@ class ResumeError(Error, ValueError):
 
 
 class BusyError(Error, RuntimeError):
-    """A call while another one computes, from a callback, or after a fork."""
+    """A call during another call, from a callback, or after a fork."""
 
 
 class ClosedError(Error, RuntimeError):
@@ -156,11 +156,11 @@ class ClosedError(Error, RuntimeError):
 
 
 class ClusterError(Error, RuntimeError):
-    """Workers that have another version, or an engine that is not there."""
+    """Workers with another version, or an engine that does not exist."""
 
     _fields: tuple[str, ...] = ("hosts",)
     hosts: Sequence[str] | None
 
 
 class InternalError(Error, RuntimeError):
-    """A mistake of Pliant. This simulation is over, others go on."""
+    """An error in Pliant itself. It ends this simulation; others continue."""

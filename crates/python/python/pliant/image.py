@@ -92,7 +92,7 @@ class Image:
         return cls(np.transpose(sitk.GetArrayFromImage(image)), to_metres @ _LPS_TO_RAS @ affine)
 
     def labels(self) -> dict[int, Label]:
-        """The labels but 0, with their voxels. Values are rounded as for a mesh: those further than 1e-4 from a whole number are a `MeshError`."""
+        """The labels except 0, with their voxels. Values are rounded as for a mesh: a value more than 1e-4 from a whole number is a `MeshError`."""
         size = float(abs(np.linalg.det(self.affine[:3, :3])))
         return {label: Label(self._names.get(label), count, count * size) for label, count in self._own.labels()}
 
@@ -117,7 +117,7 @@ class Image:
         return _native.Image(values.tobytes(order="F"), number.name, self.array.shape, affine, names)
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Writes it as NIfTI-1 of 32-bit integers, the affine matrix in millimetres (`sform`). Values are rounded as for a mesh."""
+        """Writes the image as NIfTI-1 of 32-bit integers, the affine matrix in millimetres (`sform`). Values are rounded as for a mesh."""
         whole = np.rint(self.array)
         if not bool((np.abs(whole - self.array) <= 1e-4).all()) or float(np.abs(whole).max()) >= 2**31:
             raise ValueError("the values of an image must be labels: whole numbers below 2³¹")

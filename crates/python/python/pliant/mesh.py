@@ -42,7 +42,7 @@ class Mesh:
         ``"line"`` (k, 2), numbered as VTK and meshio do. ``"wedge"`` (k, 6) and ``"pyramid"`` (k, 5) become tetrahedra, and so do
         hexahedra that share faces with them.
     point_data, cell_data
-        Values by name: (n,) or (n, c) for points; for cells in the order of `cells`, all kinds after each other.
+        Values by name: (n,) or (n, c) for points; for cells in the order of `cells`, one kind after another.
     point_sets, cell_sets
         Named sets of points, and of cells counted over all kinds, which scenes name as ``{ set = "NAME" }``.
     label_names
@@ -131,7 +131,7 @@ class Mesh:
 
     @property
     def cell_data(self) -> Mapping[str, NDArray[np.float64]]:
-        """Values of cells by name, all kinds of cells after each other; NaN where a kind has none."""
+        """Values of cells by name, one kind of cells after another; NaN where a kind has no values."""
         own: Mapping[str, NDArray[np.float64]] = self._kept("_cell_data", self._gather)
         return own
 
@@ -186,7 +186,7 @@ class Mesh:
         return cls._of(native)
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Writes it; the ending tells the format (``.vtu``, ``.vtk``, ``.msh``, ``.stl``, …)."""
+        """Writes the mesh; the ending selects the format (``.vtu``, ``.vtk``, ``.msh``, ``.stl``, …)."""
         self._own.write(os.fspath(path))
 
     @classmethod
@@ -257,21 +257,21 @@ class Mesh:
         kind: str = "tets",
         clean: Mapping[str, Any] | None = None,
     ) -> Mesh:
-        """Cells of `edge` [m] in what has one of the labels of an image. Each cell has its own as cell data ``label``."""
+        """Cells of `edge` [m] in the voxels with the given labels of an image. Cell data ``label`` holds the label of each cell."""
         own = [labels] if isinstance(labels, (int, np.integer)) else list(labels)
         return image._mesh(own, edge, kind, clean)
 
     def of_surface(self, edge: float, *, kind: str = "tets") -> Mesh:
-        """Cells of `edge` [m] in what the closed surface of this mesh encloses."""
+        """Cells of `edge` [m] inside the closed surface of this mesh."""
         return _meshed({"given": "surface", "as": kind, "edge": float(edge), "scale": 1.0}, {"surface": self})
 
     def decimate(self, triangles: int) -> Mesh:
-        """Its closed surface with so many triangles, placed where the shape needs them."""
+        """Its closed surface with the given number of triangles, placed where the shape needs them."""
         table = {"given": "surface", "as": "surface", "triangles": int(triangles), "scale": 1.0}
         return _meshed(table, {"surface": self}, shell=True)
 
     def shells(self, count: int | None = None, *, error: float | None = None) -> Mesh:
-        """Few curved shells fitted to its closed surface: `count` of them, or as many as keep within `error` of its diagonal."""
+        """Few curved shells fitted to its closed surface: `count` shells, or as many as keep within `error` of its diagonal."""
         table: dict[str, Any] = {"given": "surface", "as": "shells", "scale": 1.0}
         if count is not None:
             table["shells"] = int(count)
@@ -304,7 +304,7 @@ class Mesh:
 
     @classmethod
     def from_pyvista(cls, grid: Any, *, scale: float = 1.0) -> Mesh:
-        """From a grid or a surface of PyVista; `scale` is the size of its unit in metres. It is read as a ``.vtu`` file would be.
+        """Makes a mesh from a grid or a surface of PyVista, as from a ``.vtu`` file; `scale` is the size of its unit in metres.
 
         Arrays ``set:NAME`` become sets, the field data ``label-names`` the names of labels. Cells of kinds that a mesh does not have are a
         `ValueError`.
@@ -369,7 +369,7 @@ class Mesh:
 
     @classmethod
     def from_meshio(cls, mesh: Any, *, scale: float = 1.0) -> Mesh:
-        """From a mesh of meshio; `scale` is the size of its unit in metres. It is read as the file would be.
+        """Makes a mesh from a mesh of meshio, as from its file; `scale` is the size of its unit in metres.
 
         Arrays ``set:NAME`` become sets, the physical groups of Gmsh labels. Cells of kinds that a mesh does not have are a `ValueError`.
         """

@@ -29,15 +29,15 @@ if TYPE_CHECKING:
 __all__ = ["Body", "Model"]
 
 _MOST_THREADS = 1024
-"""As of the key ``threads`` of a scene."""
+"""The limit of the key ``threads`` of a scene."""
 
 
 @dataclass(frozen=True)
 class Body:
     """A body of a model.
 
-    `nodes` are those of the model that are its own, `mesh` is at rest [m], and `given_numbers` (nodes,) holds the number of each node in
-    the mesh that was given or read.
+    `nodes` are its nodes among all nodes of the model, `mesh` is at rest [m], and `given_numbers` (nodes,) holds the number of each node
+    in the mesh that was given or read.
     """
 
     name: str
@@ -117,7 +117,7 @@ class Model:
 
     @property
     def constraints(self) -> list[str]:
-        """Names of what is held and moved."""
+        """Names of constraints."""
         return self._own.names()["constraints"]
 
     @property
@@ -132,17 +132,17 @@ class Model:
 
     @property
     def notes(self) -> list[str]:
-        """Remarks on how it was built."""
+        """Remarks on the construction of the model."""
         return self._own.notes()
 
     @property
     def warnings(self) -> list[str]:
-        """What is questionable about it."""
+        """Warnings about the model."""
         return [str(found) for found in self._own.warnings()]
 
     @property
     def device(self) -> str:
-        """``"cpu"``, or the GPU that it is stepped on."""
+        """``"cpu"``, or the name of the GPU that computes the steps."""
         return self._own.device()
 
     def _kept(self, name: str, make: Callable[[], Any]) -> Any:
@@ -173,7 +173,7 @@ class Model:
         Parameters
         ----------
         threads
-            Threads of its own, 1024 at most; 0 for all cores. Many simulations at once do best with one each.
+            Threads of its own, 1024 at most; 0 for all cores. Many simulations at once are fastest with one thread each.
         precision
             ``"single"`` or ``"double"`` instead of the scene's.
         device
@@ -198,26 +198,26 @@ class Model:
         threads: int = 0,
         picture: bool = False,
     ) -> Result:
-        """Runs it to its end, with the outputs of the scene in the folder `out`, or in memory.
+        """Runs the model to its end, with the outputs of the scene in the folder `out`, or in memory.
 
         Parameters
         ----------
         out
-            Folder of the outputs, as of ``pliant run``; without one nothing is written, and `Result.history` has the tables.
+            Folder of the outputs, as for ``pliant run``; without one nothing is written, and `Result.history` has the tables.
         until
             Duration [s] instead of the scene's.
         each
-            Called about ten times a second with a `Progress`. What it raises ends the run.
+            Called about ten times a second with a `Progress`. An exception in it ends the run.
         force
-            Whether files of an earlier run are replaced.
+            If true, replaces files of an earlier run.
         resume
-            Whether it goes on from the last checkpoint in `out`.
+            If true, continues from the last checkpoint in `out`.
         threads
             Threads, 1024 at most; 0 for all cores.
         picture
-            Whether ``picture.png`` is drawn at the end.
+            If true, draws ``picture.png`` at the end.
 
-        A run that fails warns and returns a result whose `status` is ``"failed"``: `Result.error` has the reason, and what was found until then is kept.
+        A run that fails warns and returns a result whose `status` is ``"failed"``: `Result.error` has the reason, and the results until then are kept.
         """
         _check_threads(threads)
         result = self._run(out, until=until, each=each, threads=threads, force=force, resume=resume, picture=picture)

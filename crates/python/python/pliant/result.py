@@ -1,4 +1,4 @@
-"""What runs leave behind: histories, results, frames."""
+"""Results of runs: histories, summaries, frames."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ __all__ = ["History", "Progress", "Result"]
 
 
 class Progress(NamedTuple):
-    """How far a run is: simulated time [s], its end [s], wall time [s]."""
+    """Progress of a run: simulated time [s], its end [s], wall time [s]."""
 
     time: float
     until: float
@@ -119,8 +119,8 @@ class History(Mapping[str, NDArray[np.float64]]):
 class Result:
     """The end of a run.
 
-    `status` is ``"done"`` or ``"failed"``, and `error` then says why; `time` [s], `steps`, `wall_seconds`, `energies` [J] and `reactions` [N] are
-    those of its end. `files` are the paths that were written, `summary` is what ``pliant run --json`` prints.
+    `status` is ``"done"`` or ``"failed"``; a failed run has an `error`. `time` [s], `steps`, `wall_seconds`, `energies` [J] and `reactions` [N] are
+    values at its end. `files` are the paths that were written, `summary` is the object that ``pliant run --json`` prints.
     """
 
     status: str
@@ -187,7 +187,7 @@ class Result:
         )
 
     def frames(self, output: str | None = None) -> Iterator[tuple[float, Mesh]]:
-        """Time [s] and mesh of each frame of a series that was written: the one of a name, or the only one."""
+        """Time [s] and mesh of each frame of a series that was written: the series `output`, or the only one."""
         series = [path for path in self.files if path.endswith(".pvd")]
         if output is not None:
             series = [path for path in series if os.path.basename(path) == f"{output}.pvd"]

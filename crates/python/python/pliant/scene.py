@@ -1,4 +1,4 @@
-"""Scenes: what is simulated, as plain data."""
+"""Scenes: models and their run as plain data."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ _NAMED = (
 
 
 class Scene:
-    """What is simulated: laws, bodies, constraints, loads, tools, outputs. It is plain data and can be changed at any time.
+    """A scene to simulate: laws, bodies, constraints, loads, tools, outputs. It is plain data and can be changed at any time.
 
-    The tables are those of a scene file, `scene.body["liver"]` being ``[body.liver]``; values are dictionaries as in the file, or the
+    The tables are the tables of a scene file: `scene.body["liver"]` is ``[body.liver]``; values are dictionaries as in the file, or the
     classes of `pliant.tables`. One value is found by its path: ``scene["law.tissue.young-modulus"]``.
 
     Parameters
@@ -49,13 +49,13 @@ class Scene:
     until
         Duration [s].
     title
-        What it shows.
+        Title of the scene.
     gravity
         Acceleration [m/s²], three numbers.
     run
-        How it is stepped: the keys of ``[run]``.
+        Solver, steps and device: the keys of ``[run]``.
     folder
-        What names of files are relative to.
+        Folder that file names are relative to.
 
     Examples
     --------
@@ -105,7 +105,7 @@ class Scene:
 
     @classmethod
     def of_mesh(cls, mesh: Mesh) -> Scene:
-        """Soft tissue in the shape of a mesh, held at its lowest tenth: what the window makes of a mesh that is dropped on it.
+        """Soft tissue in the shape of a mesh, held at its lowest tenth, as for a mesh that is dropped on the window.
 
         >>> Scene.of_mesh(Mesh.block([0.1, 0.05, 0.05], edge=0.025)).constraint["held"]["type"]
         'fix'
@@ -137,7 +137,7 @@ class Scene:
 
     @property
     def constraint(self) -> MutableMapping[str, Any]:
-        """What is held and moved, by name."""
+        """Constraints, by name."""
         return self._tables("constraint")
 
     @property
@@ -177,17 +177,17 @@ class Scene:
 
     @property
     def run_table(self) -> MutableMapping[str, Any]:
-        """The keys of ``[run]``: how it is stepped."""
+        """The keys of ``[run]``: solver, steps and device."""
         return self._tables("run")
 
     @property
     def view(self) -> MutableMapping[str, Any]:
-        """The keys of ``[view]``: how it is shown."""
+        """The keys of ``[view]``: the look of pictures."""
         return self._tables("view")
 
     @property
     def title(self) -> str:
-        """What it shows."""
+        """Title of the scene."""
         return str(self._data.get("scene", {}).get("title", ""))
 
     @property
@@ -270,7 +270,7 @@ class Scene:
         return _toml.document({kind: table for kind, table in plain.items() if table}, _NAMED)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes it to a file; meshes and images from memory are written beside it, as VTU and NIfTI."""
+        """Writes the scene to a file; meshes and images from memory go to the same folder, as VTU and NIfTI."""
         path = os.fspath(path)
         given = dict(self._given)
         plain = {kind: _plain(table, given, kind) for kind, table in self._data.items()}
@@ -295,7 +295,7 @@ class Scene:
             file.write(_toml.document({kind: table for kind, table in plain.items() if table}, _NAMED))
 
     def check(self) -> list[Diagnostic]:
-        """Builds the model and forgets it: the warnings. Raises `SceneError` with all mistakes."""
+        """Builds the model, drops it and returns the warnings. Raises `SceneError` with all mistakes."""
         return _native.check(self._handed())
 
     def build(self, *, cache: bool = True, like: Model | None = None) -> Model:
@@ -304,7 +304,7 @@ class Scene:
         Parameters
         ----------
         cache
-            Whether meshes of images and surfaces are kept from run to run, as the command line does.
+            If true, keeps meshes of images and surfaces from run to run, as the command line does.
         like
             A model whose meshes are taken for bodies with the same table ``mesh``.
         """
@@ -315,7 +315,7 @@ class Scene:
         return Model._of(self.copy(), native)
 
     def run(self, out: str | os.PathLike[str] | None = None, **options: Any) -> Result:
-        """Builds it and runs it to its end: see `Model.run`."""
+        """Builds the model and runs it to its end: see `Model.run`."""
         return self.build().run(out, **options)
 
     def _mesh_of(self, body: str) -> Mesh:

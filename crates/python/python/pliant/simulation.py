@@ -1,4 +1,4 @@
-"""Simulations under way."""
+"""Simulations that are running."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ __all__ = ["Energies", "Grip", "Simulation", "State", "Tool"]
 
 
 class Energies(NamedTuple):
-    """Energies [J]; `balance` is what is missing, as a part of the largest.
+    """Energies [J]; `balance` is the missing energy, as a fraction of the largest.
 
-    `step_changes` is what explicit steps of changing length added.
+    `step_changes` is the energy added by explicit steps of changing length.
     """
 
     kinetic: float
@@ -44,7 +44,7 @@ class Energies(NamedTuple):
 
 
 class Tool(NamedTuple):
-    """A tool at an instant: place [m], quaternion (x, y, z, w), angle between its jaws [rad], and what touches it.
+    """A tool at an instant: place [m], quaternion (x, y, z, w), angle between its jaws [rad], and contact forces.
 
     `force` [N] is the sum of all contacts, `torque` [N m] their moment about the place; `None` on a GPU.
     """
@@ -57,7 +57,7 @@ class Tool(NamedTuple):
 
 
 class State:
-    """A snapshot: displacements, velocities, and what relaxing tissue remembers. It fits any model with the same meshes, and pickles."""
+    """A snapshot: displacements, velocities, and internal variables of relaxing tissue. It fits any model with the same meshes, and pickles."""
 
     _own: _native.State
 
@@ -83,7 +83,7 @@ class State:
         return self._own.displacement()
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes it to a file."""
+        """Writes the snapshot to a file."""
         bytes_of, time, steps, moved = self._own.encoded()
         parts = {f"part{k}": np.frombuffer(part, dtype=np.uint8) for k, part in enumerate(bytes_of)}
         with open(path, "wb") as file:
@@ -91,7 +91,7 @@ class State:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> State:
-        """Reads what `save` wrote."""
+        """Reads a file that `save` wrote."""
         try:
             with np.load(path, allow_pickle=False) as file:
                 parts = [file[f"part{k}"].tobytes() for k in range(sum(name.startswith("part") for name in file.files))]
@@ -111,7 +111,7 @@ def _state(parts: list[bytes], time: float, steps: int, moved: list[float]) -> S
 
 
 class Grip:
-    """A hand: a spring between the surface around a point and a place. Setting `place` pulls."""
+    """A grip: a spring between the surface around a point and a place. Setting `place` pulls."""
 
     def __init__(self, simulation: Simulation, nodes: list[tuple[int, float]], stiffness: float) -> None:
         self._simulation: Simulation | None = simulation
@@ -128,7 +128,7 @@ class Grip:
 
     @property
     def point(self) -> NDArray[np.float64]:
-        """Where what it holds is now [m]."""
+        """Present place of the gripped surface [m]."""
         return self._pulled()[0]
 
     @property
@@ -145,7 +145,7 @@ class Grip:
 
     @property
     def place(self) -> NDArray[np.float64]:
-        """Where it pulls to [m]."""
+        """Place that the grip pulls to [m]."""
         return self._place.copy()
 
     @place.setter
@@ -155,11 +155,11 @@ class Grip:
 
     @property
     def stiffness(self) -> float:
-        """Its stiffness [N/m]: as asked for, or as steps stay stable with."""
+        """Its stiffness [N/m]: as given, or lower so that steps stay stable."""
         return self._stiffness
 
     def release(self) -> None:
-        """Lets go."""
+        """Releases the grip."""
         if self._simulation is not None:
             self._simulation._grips.remove(self)
             self._simulation._hold()
@@ -167,7 +167,7 @@ class Grip:
 
 
 class Simulation:
-    """A model under way. One call at a time: another one meanwhile raises `BusyError`. It is a context manager.
+    """A running model. It takes one call at a time: a second call raises `BusyError`. It is a context manager.
 
     Examples
     --------
@@ -221,20 +221,20 @@ class Simulation:
 
     @property
     def device(self) -> str:
-        """``"cpu"``, or the GPU that it is stepped on."""
+        """``"cpu"``, or the name of the GPU that computes the steps."""
         return self._model.device
 
     @property
     def ended(self) -> str | None:
-        """Why it has ended before the last step of its scene."""
+        """The reason why it ended before the last step of its scene."""
         return self._own.ended()
 
     @property
     def displacement(self) -> NDArray[np.float32] | NDArray[np.float64]:
         """Displacements of all nodes [m], (nodes, 3): a live view, always of the newest instant, read-only, without a copy.
 
-        It is in the solver's own numbers. ``np.array(sim.displacement)`` keeps an instant. A thread that reads it during a step of another
-        one may see two instants mixed.
+        It is in the solver's own numbers. ``np.array(sim.displacement)`` keeps an instant. A thread that reads the view
+        during a step of another thread may see two instants mixed.
         """
         return self._own.displacement
 
@@ -264,11 +264,11 @@ class Simulation:
         Parameters
         ----------
         name
-            As in ``data = […]`` of outputs: ``"von-mises"``, ``"contact-pressure"``, ….
+            A name as in ``data = […]`` of outputs: ``"von-mises"``, ``"contact-pressure"``, ….
         on
-            A body or a carried surface; without one all bodies, one after another.
+            A body or a carried surface; if not given, all bodies, one after another.
         at
-            ``"points"`` or ``"cells"``; where the field is, if not given.
+            ``"points"`` or ``"cells"``; if not given, the place where the field is computed.
         """
         if at not in (None, "points", "cells"):
             raise ValueError(f"a field is at points or cells, not {at!r}")
@@ -292,14 +292,14 @@ class Simulation:
         return np.array(found)
 
     def enclosed(self, constraint: str) -> tuple[float, float]:
-        """Volume [m³] and pressure [Pa] of a constraint of volume."""
+        """Volume [m³] and pressure [Pa] of a constraint ``volume``."""
         found = self._own.enclosed(constraint)
         if found is None:
             raise KeyError(f"there is no constraint of volume `{constraint}`")
         return found[0], found[1]
 
     def contacts(self) -> dict[str, NDArray[np.float64]]:
-        """Force of each contact on what it is with [N], (3,), by name.
+        """Force of each contact on its second partner [N], (3,), by name.
 
         A contact between several things has pairs, such as ``"hold.liver-grasper.upper"`` of ``between = ["liver", "grasper"]``.
         """
@@ -321,19 +321,19 @@ class Simulation:
         opening: float | None = None,
         within: float = 0.0,
     ) -> float:
-        """Leads a tool to a pose, and its jaws to an angle: when it arrives [s].
+        """Leads a tool to a pose, and its jaws to an angle; returns the time of arrival [s].
 
         Parameters
         ----------
         tool
             Its name.
         pose
-            A place [m], a pair of place and quaternion (x, y, z, w), or a matrix (4, 4). A place alone keeps its orientation. Without one
-            the tool goes on as it was going.
+            A place [m], a pair of place and quaternion (x, y, z, w), or a matrix (4, 4). A place alone keeps its orientation. Without a
+            pose the tool continues its motion.
         opening
-            Angle between the jaws [rad]. Without one they go on as they were going.
+            Angle between the jaws [rad]. Without one the jaws continue their motion.
         within
-            Time to get there [s]; a step, if it is shorter.
+            Time to get there [s], at least a step.
         """
         if pose is None and opening is None:
             raise ValueError(f"`{tool}` has no goal: give a pose, an opening, or both")
@@ -346,7 +346,7 @@ class Simulation:
         return self._own.drive(tool, goal, None if opening is None else float(opening), float(within))
 
     def open(self, tool: str, angle: float, *, within: float = 0.0) -> float:
-        """Opens the jaws of a tool to an angle [rad], or closes them, while it goes on as it was going: when they are there [s]."""
+        """Opens or closes the jaws of a tool to an angle [rad], while the tool continues its motion; returns the time of arrival [s]."""
         return self.drive(tool, opening=angle, within=within)
 
     def sample(self) -> dict[str, float]:
@@ -354,7 +354,7 @@ class Simulation:
         return dict(zip((name for name, _ in self._own.columns()), self._own.sample(), strict=True))
 
     def step(self, count: int = 1) -> int:
-        """Goes so many steps on; the steps done, fewer where the run ends before."""
+        """Takes steps; returns the steps done, fewer if the run ends before."""
         number = operator.index(count)
         if number < 0:
             raise ValueError(f"the number of steps must be at least 0, not {count}")
@@ -369,18 +369,18 @@ class Simulation:
         every: float | None = None,
         record: str | Sequence[str] = (),
     ) -> History:
-        """Goes on to a time, and records on the way. What ends it early has the history until then as its attribute `history`.
+        """Runs to a time, and records on the way. An exception that ends the run early has the history until then as its attribute `history`.
 
         Parameters
         ----------
         until
             Time [s]; the end of the scene, if not given.
         each
-            Called at every sample, between steps: it may read, move grips and tools, push and set. What it raises comes through.
+            Called at every sample, between steps: it may read, move grips and tools, push and set. Its exceptions pass through.
         every
-            Time between samples [s], at least a step; that of the scene's table, or a thousandth of the way.
+            Time between samples [s], at least a step. If not given, the interval of the scene's table, or a thousandth of the run.
         record
-            Fields at points that are recorded, too, one or several: ``history["displacement"]`` is (samples, nodes, 3).
+            Further fields at points to record, one or several: ``history["displacement"]`` is (samples, nodes, 3).
         """
         self._free()
         end = self._model._scene.until if until is None else float(until)
@@ -444,7 +444,7 @@ class Simulation:
             raise BusyError("a callback of `run` may read, pull and set; it must not take steps or restore a snapshot")
 
     def push(self, forces: ArrayLike | None, *, body: str | None = None) -> None:
-        """Forces on all nodes [N], (nodes, 3), or on those of a body; they stay until replaced. `None` ends them."""
+        """Sets forces on all nodes [N], (nodes, 3), or on the nodes of a body. They stay until replaced; `None` ends them."""
         if forces is None:
             self._own.push(None)
             return
@@ -476,13 +476,13 @@ class Simulation:
         at
             A place [m].
         nodes
-            Nodes of the model instead, held by their mean.
+            Nodes of the model instead of a place, held by their mean.
         on
             The body to hold; the nearest one, if not given.
         radius
-            How far around the place it holds [m]; two edges of the mesh, if not given.
+            Radius of the gripped surface [m]; if not given, two edges of the mesh.
         stiffness
-            Of its spring [N/m]; less, where steps would not be stable.
+            Stiffness of the spring [N/m]; reduced where steps would not be stable.
         """
         if (at is None) == (nodes is None):
             raise ValueError("give a grip either a place or nodes")
@@ -512,7 +512,7 @@ class Simulation:
             grip._stiffness = stiffness
 
     def set(self, values: Mapping[str, float]) -> None:
-        """Other numbers of laws, loads, density or damping, by their paths, from the next step on. Steps may get another length."""
+        """Changes numbers of laws, loads, density or damping, by their paths, from the next step on. The step length may change."""
         scene = self._model._scene.replace(dict(values))
         model = scene.build(like=self._model)
         if not self._own.exchange(model._own):
@@ -522,11 +522,11 @@ class Simulation:
         self._hold()
 
     def state(self) -> State:
-        """A snapshot. Hands, pushed forces and the numbers of `set` are not part of it."""
+        """A snapshot, without grips, pushed forces and the numbers of `set`."""
         return State._of(self._own.state())
 
     def restore(self, state: State) -> None:
-        """Goes back, or on, to a snapshot. Grips and pushed forces stay. A callback of `run` can't do so: the run would have no end."""
+        """Restores a snapshot. Grips and pushed forces stay. A callback of `run` cannot call this: the run would have no end."""
         self._free()
         try:
             self._own.restore(state._own)
@@ -544,11 +544,11 @@ class Simulation:
         return other
 
     def fingerprint(self) -> int:
-        """A number of all bits of the motion: equal motions have equal ones."""
+        """A hash of all bits of the motion: equal motions have equal hashes."""
         return self._own.fingerprint()
 
     def mesh(self, data: Sequence[str] = ("displacement",), *, on: str | None = None, at: str = "points") -> Mesh:
-        """The mesh at rest of a body, a surface or all, with fields of the instant."""
+        """The mesh at rest of a body, a surface or all bodies, with fields of the instant."""
         return Mesh._of(self._own.mesh(list(data), on, at == "cells"))
 
     def picture(
@@ -563,7 +563,7 @@ class Simulation:
         Parameters
         ----------
         field
-            What the colours tell, instead of the scene's.
+            Field for the colours, instead of the scene's.
         size
             Width and height in pixels.
         camera
@@ -584,7 +584,7 @@ class Simulation:
             return None
 
     def close(self) -> None:
-        """Ends it. Views stay readable; everything else raises `ClosedError`."""
+        """Ends the simulation. Views stay readable; everything else raises `ClosedError`."""
         self._own.close()
 
     def __enter__(self) -> Simulation:

@@ -1,4 +1,4 @@
-"""Many runs with other values, on one machine or many."""
+"""Many runs with different values, on one machine or many."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _TABLE = "sweep.csv"
 
 @dataclass
 class Sweep:
-    """The rows of a sweep, in the order of the combinations: values, `status`, `error`, and what was found at the end of each run.
+    """The rows of a sweep, in the order of the combinations: values, `status`, `error`, and the results at the end of each run.
 
     `keys` are the paths that were varied, `path` is the folder of the table.
     """
@@ -151,28 +151,28 @@ def sweep(
         Lists of values by path, of which all combinations are run, the last path changing fastest; or one mapping for each run; or a data frame, a row a run.
         A value is a number, a text, a vector or a table, also of NumPy, or a mesh.
     out
-        Folder of ``rows.jsonl`` and ``sweep.csv``. The same call again goes on where it was interrupted.
+        Folder of ``rows.jsonl`` and ``sweep.csv``. The same call again continues an interrupted sweep.
     on
         ``"local"`` (threads), ``"dask"``, ``"ray"``, a client of Dask, or an executor.
     cores, gpus
-        What a run takes.
+        Cores and GPUs for one run.
     retries
-        How often a run is repeated whose worker was lost. Runs that fail are rows, and not repeated.
+        Number of times that a run is repeated if its worker is lost. Runs that fail become rows and are not repeated.
     measure
-        Called with the `Result` of each run, where it was done; what it returns goes into the row. If it raises, the row has failed, and keeps
+        Called with the `Result` of each run, on the worker; its returned mapping goes into the row. If it raises, the row has failed, and keeps
         the columns of the run.
     keep
         ``"all"`` writes the outputs of each run to ``out/run-NNNN``, which all workers must reach.
     resume
-        Whether rows of an earlier call are taken: those of the same scene, values, version and `measure`, whose code counts with the functions
+        If true, takes rows of an earlier call with the same scene, values, version and `measure`. The code of `measure` includes the functions
         and plain values of its module that it names.
     retry
-        ``"failed"`` runs again what failed in an earlier call.
+        ``"failed"`` repeats the failed runs of an earlier call.
     progress
-        Whether a line on standard error tells how many runs have ended.
+        If true, a line on standard error shows the number of runs that have ended.
 
-    Ctrl-C stops the runs under way on threads of this process; elsewhere it cancels what is queued. Rows of runs that have ended are kept, so
-    that the same call goes on.
+    Ctrl-C stops active runs on threads of this process; elsewhere it cancels the queued runs. Rows of runs that have ended are kept, so
+    that the same call continues the sweep.
 
     Examples
     --------
@@ -234,7 +234,7 @@ def sweep(
 
 
 def merge(out: str | os.PathLike[str]) -> Sweep:
-    """Puts together the parts that ``pliant sweep --part i/n`` wrote to a folder, writes the table, and names what is missing."""
+    """Joins the parts that ``pliant sweep --part i/n`` wrote to a folder, writes the table, and names missing runs."""
     folder = os.fspath(out)
     parts = sorted(glob.glob(os.path.join(glob.escape(folder), "rows-*-of-*.jsonl")))
     if not parts:

@@ -1,4 +1,4 @@
-"""Where the runs of a sweep are done: threads of this process, Dask, Ray, or any executor.
+"""Engines for the runs of a sweep: threads of this process, Dask, Ray, or any executor.
 
 An engine takes tasks, keeps at most two of them in flight for each of its cores, and gives back what they return as they end.
 Tasks never raise: a run that fails is a row as any other, so engines repeat only what a lost worker had.
