@@ -28,8 +28,11 @@ pub struct PliantNodes {
 /// Fault of an unknown name, with the known names.
 pub(crate) fn unknown(own: &Running, kind: u32, what: &str, name: &str) -> Fault {
     let known = names(own, kind).unwrap_or_default();
-    let those =
-        if known.is_empty() { "there is none".into() } else { format!("there are {}", known.join(", ")) };
+    let those = if known.is_empty() {
+        "the simulation has none".into()
+    } else {
+        format!("there are {}", known.join(", "))
+    };
     Fault::new(PliantStatus::Unknown, format!("there is no {what} `{name}`; {those}"))
 }
 

@@ -95,7 +95,7 @@ impl SolidStrains {
         let volumes = self.volumes().filter(|own| own.change.abs() > MUCH).map(|own| {
             let VolumeChange { body, change, element, time } = own;
             format!(
-                "`{body}` changes its volume by {:+.1} % in element {element} (counted from 0) at t = {} s, though its law is \
+                "`{body}` changes its volume by {:+.1} % in element {element} (counted from 0) at t = {} s; its law is \
                  nearly incompressible or has fibres, which load the bulk modulus; take a larger `bulk-modulus` or `poisson-ratio`",
                 100.0 * change,
                 number(*time)

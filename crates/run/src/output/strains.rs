@@ -72,8 +72,8 @@ impl ShellStrains {
             let StrainSummary { body, largest, membrane, element, time, above_from } = strain;
             let percent = |strain: &f64| format!("{:.1} %", 100.0 * strain);
             Some(format!(
-                "`{body}` is strained by {} in triangle {element} (counted from 0) at t = {} s, by {} there in its middle \
-                 surface, and by more than 10 % from t = {} s on; shells are linearly elastic for small strain, so forces \
+                "`{body}` is strained by {} in triangle {element} (counted from 0) at t = {} s, and by {} there in its middle \
+                 surface; it is strained by more than 10 % from t = {} s on; shells are linearly elastic for small strain, so forces \
                  and stresses are questionable there; take smaller loads, `model = \"membrane\"` if bending does not matter, or a \
                  solid, both with a hyperelastic law",
                 percent(largest),
