@@ -79,8 +79,8 @@ pub fn add_as_tets(mesh: &mut Mesh, cells: &[SplitCells]) -> Option<String> {
     }
     match hexes.len() {
         0 => {}
-        1 => counts.push("1 hex joined to such cells".to_owned()),
-        number => counts.push(format!("{number} hexes joined to such cells")),
+        1 => counts.push("1 adjacent hex".to_owned()),
+        number => counts.push(format!("{number} adjacent hexes")),
     }
     let mut tets = Vec::new();
     for cells in cells {
@@ -115,7 +115,7 @@ pub fn add_as_tets(mesh: &mut Mesh, cells: &[SplitCells]) -> Option<String> {
     }
     let centres = match splitter.centres {
         0 => String::new(),
-        number => format!("; {number} of them got a node at their centre"),
+        number => format!("; {number} of these cells got a node at the centre"),
     };
     Some(format!("split into tets: {}{centres}", counts.join(", ")))
 }
@@ -420,7 +420,7 @@ mod tests {
         let whole = |mesh: &Mesh| crate::QualityReport::new(mesh).volume;
         let outer = whole(&mesh);
         let said = add_as_tets(&mut mesh, &[cells(SplitKind::Wedge, &wedge)]).unwrap();
-        assert_eq!(said, "split into tets: 1 wedge; 1 of them got a node at their centre");
+        assert_eq!(said, "split into tets: 1 wedge; 1 of these cells got a node at the centre");
         assert_eq!((mesh.points.len(), mesh.blocks[0].len()), (10, 6 + 8));
         assert!((mesh.point_data["x"].values[9] - 1.0 / 3.0).abs() < 1e-15);
         assert!((whole(&mesh) - outer - 0.5).abs() < 1e-14);
@@ -452,7 +452,7 @@ mod tests {
         pyramid.data.insert("label".into(), DataArray::scalar(vec![7.0]));
         pyramid.sets.insert("tip".into(), vec![0]);
         let said = add_as_tets(&mut mesh, &[pyramid]).unwrap();
-        assert_eq!(said, "split into tets: 1 pyramid, 1 hex joined to such cells");
+        assert_eq!(said, "split into tets: 1 pyramid, 1 adjacent hex");
         let [block] = &mesh.blocks[..] else { panic!() };
         assert_eq!(block.data["label"].values, [[7.0; 2].as_slice(), &[3.0; 6]].concat());
         assert_eq!((&block.sets["tip"][..], &block.sets["low"][..]), (&[0, 1][..], &[2, 3, 4, 5, 6, 7][..]));

@@ -309,7 +309,8 @@ pub enum LabelError {
     },
     /// Two images to add have different voxels.
     #[error(
-        "the images have different voxels ({first:?} and {second:?}, or other positions); resample one of them"
+        "the images have different grids ({first:?} and {second:?} voxels, or different positions); resample \
+         one image"
     )]
     OtherVoxels {
         /// Voxels along i, j, k of the first.

@@ -305,8 +305,9 @@ impl Image {
         let (voxels, most) = far
             .fold(|| (0_usize, 0.0_f64), |(n, most), off| (n + 1, most.max(off)))
             .reduce(|| (0, 0.0), |a, b| (a.0 + b.0, a.1.max(b.1)));
-        (voxels > 0)
-            .then(|| format!("{voxels} voxels miss whole numbers, by up to {most:.2e}: rounded to labels"))
+        (voxels > 0).then(|| {
+            format!("{voxels} voxels differ from whole numbers by up to {most:.2e}: rounded to labels")
+        })
     }
 
     /// The least and the largest value that is finite.

@@ -15,7 +15,8 @@ pub enum MeshingError {
     },
     /// No mesh of a curved body is made of ideal tets.
     #[error(
-        "target is {target}; the least acoustic length can't reach that of ideal tets: 0.75 is usual, 0.9 the best"
+        "target is {target}, but no mesh of a curved body reaches the acoustic length of ideal tets; 0.75 is \
+         usual, 0.9 the best"
     )]
     TargetTooHigh {
         /// Requested fraction of the ideal.
@@ -34,7 +35,7 @@ pub enum MeshingError {
         asked: f64,
     },
     /// A requested label is not meshed.
-    #[error("label {label} can't be protected; the mesh has the labels {}", labels.iter().map(i32::to_string).collect::<Vec<_>>().join(", "))]
+    #[error("the mesh has no label {label} to protect; its labels are {}", labels.iter().map(i32::to_string).collect::<Vec<_>>().join(", "))]
     NoSuchLabel {
         /// The label.
         label: i32,
@@ -50,7 +51,7 @@ pub enum MeshingError {
         value: Vector3,
     },
     /// An explicit number of cells is zero.
-    #[error("0 cells asked for along {axis}; at least 1 is needed")]
+    #[error("the number of cells along {axis} is 0; give at least 1")]
     NoCellsAlong {
         /// `x`, `y` or `z`.
         axis: char,
@@ -152,7 +153,7 @@ pub enum MeshingError {
     },
     /// The body reaches beyond its own box.
     #[error(
-        "the body reaches ({}, {}, {}) m, outside the box it gives; make the box larger",
+        "the body reaches ({}, {}, {}) m, outside its box; make the box larger",
         point.x, point.y, point.z
     )]
     BodyLeavesBox {

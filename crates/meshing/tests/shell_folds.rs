@@ -148,7 +148,7 @@ fn shells_of_a_fold_do_not_cross_where_the_goal_is_out_of_reach() {
     let off = report.distances.largest() / report.diagonal;
     assert_eq!(report.reached, off <= 0.01);
     if !report.reached {
-        let told = format!("the best so far is {:.3} %", 100.0 * off);
+        let told = format!("at best {:.3} % reached", 100.0 * off);
         assert!(report.warnings()[0].contains(&told), "{report}");
     }
 }

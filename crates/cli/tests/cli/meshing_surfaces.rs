@@ -153,7 +153,7 @@ fn what_was_mended_is_told() {
         (ball(RADIUS, 0.0), &[], &["mended nothing"]),
         (inverted(ball(RADIUS, 0.0)), &[], &["5120 faces turned"]),
         (holed, &[], &["1 hole of up to", "mm closed"]),
-        (doubled, &[], &["2 faces without area or duplicate dropped"]),
+        (doubled, &[], &["2 faces dropped (duplicate or without area)"]),
         (
             both(ball(RADIUS, 0.0), ball(RADIUS, 11.0)),
             &[],

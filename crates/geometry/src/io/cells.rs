@@ -256,7 +256,7 @@ pub(super) fn check_filled(numbers: usize, file_size: usize) -> Result<(), Fault
     if numbers.saturating_mul(size_of::<f64>()) <= array_limit(file_size) {
         return Ok(());
     }
-    Err(Fault::malformed(Place::File, "the arrays are far larger than the file"))
+    Err(Fault::malformed(Place::File, "the announced arrays are far larger than the file"))
 }
 
 /// A point of a file, which must be finite. `number` is its number in the file.

@@ -74,7 +74,7 @@ fn without_doctype(text: &str) -> Result<String, Fault> {
     if declaration.contains('[') {
         return Err(Fault::unsupported(
             Place::Line(1),
-            "a document type with declarations of its own is",
+            "a document type with its own declarations is",
             "remove it",
         ));
     }
@@ -122,7 +122,7 @@ impl<'a> Array<'a, '_> {
         let bytes = count.saturating_mul(scalar.size().max(size_of::<f64>()));
         *budget = budget
             .checked_sub(bytes)
-            .ok_or_else(|| self.malformed("the arrays are far larger than the file"))?;
+            .ok_or_else(|| self.malformed("the announced arrays are far larger than the file"))?;
         let data = self.node.children().find(|child| child.has_tag_name("Data"));
         let text = data.and_then(|data| data.text()).unwrap_or_default();
         let values = match self.attribute("Encoding") {

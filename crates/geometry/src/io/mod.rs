@@ -241,7 +241,8 @@ impl MeshFile {
     fn turn_from_lps(&mut self) {
         self.mesh.transform(&Matrix3::from_diagonal(&Vector3::new(-1.0, -1.0, 1.0)));
         self.notes.push(
-            "the file has the axes left, back, head (LPS): turned to right, front, head (RAS), as images have them"
+            "the axes of the file, left, back, head (LPS), were turned to the axes of images: right, front, \
+             head (RAS)"
                 .to_owned(),
         );
     }
@@ -367,7 +368,7 @@ fn problem(mesh: &Mesh) -> Option<String> {
         let fits = array.components > 0 && Some(array.values.len()) == items.checked_mul(array.components);
         let (found, components) = (array.values.len(), array.components);
         (!fits).then(|| {
-            format!("data `{name}` of the {whose} have {found} numbers, not {components} for each of {items}")
+            format!("data `{name}` have {found} numbers, not {components} for each of {items} {whose}")
         })
     };
     for (name, array) in &mesh.point_data {
@@ -377,30 +378,45 @@ fn problem(mesh: &Mesh) -> Option<String> {
     }
     for (name, set) in &mesh.point_sets {
         if let Some(point) = set.iter().find(|&&point| point as usize >= points) {
-            return Some(format!("the set `{name}` holds point {point} of only {points}"));
+            return Some(format!(
+                "the set `{name}` contains point {point}, but the mesh has {points} points, counted from 0"
+            ));
         }
     }
     let mut components = std::collections::BTreeMap::new();
     for block in &mesh.blocks {
         let kind = block.kind.name();
         if block.nodes.len() % block.kind.node_count() != 0 {
-            return Some(format!("the {kind} cells have {} nodes in all", block.nodes.len()));
+            return Some(format!(
+                "the list of nodes of the {kind} cells has {} entries, not a multiple of {}",
+                block.nodes.len(),
+                block.kind.node_count()
+            ));
         }
         if let Some(at) = block.nodes.iter().position(|&node| node as usize >= points) {
             let cell = at / block.kind.node_count();
-            return Some(format!("{kind} {cell} uses node {} of only {points}", block.nodes[at]));
+            return Some(format!(
+                "{kind} {cell} uses node {}, but the mesh has {points} points, counted from 0",
+                block.nodes[at]
+            ));
         }
         for (name, array) in &block.data {
             if let Some(problem) = wrong(name, array, block.len(), &format!("{kind} cells")) {
                 return Some(problem);
             }
             if *components.entry(name).or_insert(array.components) != array.components {
-                return Some(format!("data `{name}` have different numbers of components per kind of cell"));
+                return Some(format!(
+                    "data `{name}` have different numbers of components in different kinds of cells"
+                ));
             }
         }
         for (name, set) in &block.sets {
             if let Some(cell) = set.iter().find(|&&cell| cell as usize >= block.len()) {
-                return Some(format!("the set `{name}` holds {kind} {cell} of only {}", block.len()));
+                return Some(format!(
+                    "the set `{name}` contains {kind} {cell}, but the mesh has {} {kind} cells, counted from \
+                     0",
+                    block.len()
+                ));
             }
         }
     }
@@ -414,7 +430,7 @@ fn check_gmsh(path: &Path, mesh: &Mesh) -> Result<(), MeshFileError> {
         Some((name, array)) => Err(MeshFileError::Mesh {
             path: path.to_owned(),
             problem: format!(
-                "data `{name}` have {} components, and Gmsh's at most 9; write .vtu",
+                "data `{name}` have {} components, but a Gmsh file takes at most 9; write .vtu",
                 array.components
             ),
         }),

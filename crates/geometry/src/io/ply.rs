@@ -214,7 +214,11 @@ impl PlyReader<'_> {
         list.clear();
         let count = self.number(length, element, item)?;
         if !(count >= 0.0 && count.fract() == 0.0) {
-            let what = format!("item {item} of `{}` has a list of {count} numbers", element.name);
+            let what = format!(
+                "item {item} of `{}` has a list of {count} numbers: the length of a list must be a whole \
+                 number",
+                element.name
+            );
             return Err(self.cursor.malformed(what));
         }
         let what = format_args!("a list of item {item} of `{}`", element.name);

@@ -224,7 +224,10 @@ impl<'a> Storage<'a> {
             // Filling arrays that only some pieces have must not multiply the file either.
             let filled = point_data.filled().saturating_add(cell_data.filled());
             if filled > limit {
-                return Err(Fault::malformed(self.line(piece), "the arrays are far larger than the file"));
+                return Err(Fault::malformed(
+                    self.line(piece),
+                    "the announced arrays are far larger than the file",
+                ));
             }
         }
         for (name, array) in &cell_data.arrays {
@@ -490,9 +493,10 @@ impl<'a> Storage<'a> {
                 self.budget = left;
                 Ok(())
             }
-            None => {
-                Err(Fault::malformed(place, format!("the arrays up to {what} are far larger than the file")))
-            }
+            None => Err(Fault::malformed(
+                place,
+                format!("the announced arrays up to {what} are far larger than the file"),
+            )),
         }
     }
 

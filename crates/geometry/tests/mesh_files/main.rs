@@ -306,7 +306,7 @@ fn gifti_says_what_it_leaves_out() {
         ("NIFTI_TYPE_FLOAT32", "NIFTI_TYPE_RGB24", "not a type of points"),
         ("Dim1=\"3\"", "Dim1=\"2\"", "`Dim0` and `Dim1`"),
         ("Dim0=\"4\"", "Dim0=\"400000000\"", "far larger than the file"),
-        ("SYSTEM \"http", "[<!ENTITY a \"b\">] \"http", "declarations of its own"),
+        ("SYSTEM \"http", "[<!ENTITY a \"b\">] \"http", "its own declarations"),
         ("<GIFTI", "<GOFTI", "XML is broken"),
         ("NIFTI_INTENT_TRIANGLE", "NIFTI_INTENT_SHAPE", "no cells"),
     ] {
@@ -488,7 +488,11 @@ fn surfaces_of_3d_slicer_have_the_axes_of_images() {
         let file = text(&content, format);
         let expected = points(&[[1.0, 2.0, 3.0], [4.0, 2.0, 3.0], [4.0, 5.0, 3.0]]);
         assert_eq!(file.mesh.points, expected, "{format:?}");
-        assert!(file.notes.iter().any(|note| note.contains("(LPS): turned")), "{format:?}: {:?}", file.notes);
+        assert!(
+            file.notes.iter().any(|note| note.contains("(LPS), were turned")),
+            "{format:?}: {:?}",
+            file.notes
+        );
         let kept = content.replace("SPACE=LPS", "SPACE=RAS");
         if kept != content {
             assert_eq!(text(&kept, format).mesh.points[0], Vector3::new(-1.0, -2.0, 3.0), "{format:?}");

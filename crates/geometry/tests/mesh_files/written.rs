@@ -265,11 +265,11 @@ pub(super) fn meshes_that_are_not_whole_are_not_written() {
     type Spoil = fn(&mut Mesh);
     let cases: [(&str, Spoil); 6] = [
         ("point 3 is not finite", |mesh| mesh.points[3].y = f64::NAN),
-        ("tet 1 uses node 99 of only 9", |mesh| mesh.blocks[1].nodes[7] = 99),
-        ("data `velocity` of the points have 26 numbers", |mesh| {
+        ("tet 1 uses node 99, but the mesh has 9 points", |mesh| mesh.blocks[1].nodes[7] = 99),
+        ("data `velocity` have 26 numbers, not 3 for each of 9 points", |mesh| {
             mesh.point_data.get_mut("velocity").unwrap().values.pop();
         }),
-        ("the set `far` holds point 9", |mesh| {
+        ("the set `far` contains point 9", |mesh| {
             mesh.point_sets.insert("far".to_owned(), vec![9]);
         }),
         ("different numbers of components", |mesh| {

@@ -70,7 +70,7 @@ pub(super) fn joined(
         bytes.extend(last.map_or(0, label).to_le_bytes());
     }
     if !own {
-        notes.push("segments share values: labels are the segment numbers from 1".into());
+        notes.push("several segments share a value: the labels are the segment numbers from 1".into());
     }
     if shared > 0 {
         notes.push(format!("segments overlap in {shared} voxels, which belong to the later one"));

@@ -144,7 +144,7 @@ fn labels_off_by_their_storage_are_rounded() {
     let scaled = read_bytes(&bytes, ImageFormat::Nifti, &ReadOptions::default()).unwrap();
     assert_eq!(scaled.labels().unwrap().labels, [0, 2, 1001, 14175]);
     let note = scaled.rounding().unwrap();
-    assert!(note.starts_with("4 voxels miss whole numbers, by up to 1.08e-1: rounded"), "{note}");
+    assert!(note.starts_with("4 voxels differ from whole numbers by up to 1.08e-1: rounded"), "{note}");
     // From a step of 1 on, several labels have one number.
     bytes[112..116].copy_from_slice(&1.5_f32.to_le_bytes());
     let coarse = read_bytes(&bytes, ImageFormat::Nifti, &ReadOptions::default()).unwrap();
@@ -259,7 +259,7 @@ fn layers_of_segments_become_one_image() {
     let image = layered("1 0  2 1  0 1  2 0", &again).unwrap();
     assert_eq!(labels(&image), [1, 3, 2, 3], "the vein comes after the tumour");
     assert_eq!(image.names.get(3), Some("vein"));
-    assert!(image.notes[0].contains("share values") && image.notes[1].contains("overlap in 1"));
+    assert!(image.notes[0].contains("share a value") && image.notes[1].contains("overlap in 1"));
     // A number of no segment is background; a note counts it.
     let image = layered("9 0  5 0  0 0  0 3", &own).unwrap();
     assert_eq!(labels(&image), [0, 5, 0, 0]);

@@ -55,8 +55,8 @@ impl SurfaceCheck {
         let [x, y, z] = self.first_crossing?;
         let number = self.self_intersections;
         Some(format!(
-            "{number} faces of the mesh boundary pass through others, the first at ({x:.4}, {y:.4}, {z:.4}) m; a smaller edge there \
-             parts them, unless the body's surface passes through itself"
+            "{number} faces of the mesh boundary pass through others, the first at ({x:.4}, {y:.4}, {z:.4}) \
+             m; use a smaller edge there, unless the body's surface passes through itself"
         ))
     }
 }

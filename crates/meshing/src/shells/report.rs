@@ -75,8 +75,8 @@ impl ShellReport {
         let missed = (!self.reached).then(|| self.missed());
         let crossings = (self.crossings.count > 0).then(|| {
             format!(
-                "{} through other shells or {}, at {} and elsewhere: so do flat triangles there; the surface may pass through itself, \
-                 or a smaller error or more shells help",
+                "{} through other shells or {}, at {} and elsewhere, even as flat triangles: check whether \
+                 the surface passes through itself; otherwise, try a smaller error or more shells",
                 counted(self.crossings.count, "shell passes", "shells pass"),
                 if self.crossings.count == 1 { "itself" } else { "themselves" },
                 self.crossings.place(),
@@ -84,16 +84,17 @@ impl ShellReport {
         });
         let creases = (self.creases.count > 0).then(|| {
             format!(
-                "{} without a normal, at {} and elsewhere: the surface folds too sharply there for one within 60° of all triangles, \
-                 or for curved shells that do not cross; in a scene they are creases",
+                "{} without a normal, at {} and elsewhere: in a scene they are creases. The surface folds so \
+                 sharply there that no normal is within 60° of all triangles, or that curved shells would \
+                 cross",
                 counted(self.creases.count, "node is", "nodes are"),
                 self.creases.place(),
             )
         });
         let flat = (self.flattened.count > 0).then(|| {
             format!(
-                "{} flat, at {} and elsewhere: curved they would pass through others or be farther off; cell data `flat` says which, and a scene keeps \
-                 them flat",
+                "{} flat, at {} and elsewhere: curved shells would pass through others or be farther off; \
+                 cell data `flat` marks them, and a scene keeps them flat",
                 counted(self.flattened.count, "shell is", "shells are"),
                 self.flattened.place(),
             )
@@ -114,23 +115,23 @@ impl ShellReport {
 
     fn missed(&self) -> String {
         let Some(asked) = self.asked else {
-            let remedy = "the surface allows no more, or ask for fewer";
+            let remedy = "request fewer shells, unless the surface itself allows no more";
             return format!(
-                "not reached: {} shells are the most that the work allowed makes; {remedy}",
+                "not reached: the fit ended at its limit of work with {} shells; {remedy}",
                 self.shells
             );
         };
         let off = self.distances.largest();
         format!(
-            "not reached: {} % was asked for; the best so far is {:.3} % ({:.2} mm off) at {}. {}",
+            "not reached: {} % requested, at best {:.3} % reached ({:.2} mm off) at {}. {}",
             (1e8 * asked).round() / 1e6,
             100.0 * off / self.diagonal,
             1e3 * off,
             millimetres(&self.farthest),
             if self.stopped {
-                "The work of a fit is bounded: ask for a larger error, or smooth or crop the surface"
+                "The fit ended at its limit of work: request a larger error, or smooth or crop the surface"
             } else {
-                "There the surface may pass through itself or have creases"
+                "The surface may pass through itself or have creases there"
             }
         )
     }
@@ -155,7 +156,7 @@ impl fmt::Display for ShellReport {
         let [there, back] = self.distances.lines(self.diagonal, ["shells to target", "target to shells"]);
         writeln!(f, "{there}\n{back}")?;
         writeln!(f, "farthest apart   at {}", millimetres(&self.farthest))?;
-        let [there, back] = self.flat.lines(self.diagonal, ["were they flat  ", "and back        "]);
+        let [there, back] = self.flat.lines(self.diagonal, ["flat triangles  ", "and back        "]);
         write!(f, "{there}\n{back}")?;
         self.warnings().iter().try_for_each(|warning| write!(f, "\nwarning: {warning}"))
     }

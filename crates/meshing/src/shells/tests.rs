@@ -130,11 +130,11 @@ fn a_fit_that_cannot_reach_its_goal_ends_with_the_best_so_far() {
         let off = report.distances.largest() / report.diagonal;
         assert!(report.stopped && !report.reached && off > 1e-5);
         let [x, y, z] = report.farthest.map(|x| 1e3 * x);
-        let told = format!("not reached: 0.001 % was asked for; the best so far is {:.3} % (", 100.0 * off);
+        let told = format!("not reached: 0.001 % requested, at best {:.3} % reached (", 100.0 * off);
         assert!(report.warnings()[0].starts_with(&told), "{report}");
         assert!(
             report.warnings()[0]
-                .contains(&format!("({x:.1}, {y:.1}, {z:.1}) mm. The work of a fit is bounded"))
+                .contains(&format!("({x:.1}, {y:.1}, {z:.1}) mm. The fit ended at its limit of work"))
         );
     }
     assert!(short < long && more.report.distances.largest() < few.report.distances.largest());

@@ -71,7 +71,8 @@ impl SurfaceVolume {
         let off = self.labels.iter().filter(|own| own.error().abs() > LARGEST_VOLUME_ERROR);
         let off = off.map(|own| {
             format!(
-                "the surface encloses {:.1} % {} of label {} than the input ({:.3} ml for {:.3} ml); use smaller triangles",
+                "the surface encloses {:.1} % {} of label {} than the input ({:.3} ml instead of {:.3} ml); \
+                 use smaller triangles",
                 100.0 * own.error().abs(),
                 if own.error() < 0.0 { "less" } else { "more" },
                 own.label,
@@ -146,7 +147,8 @@ impl TriangleMesh {
         let error = self.volume() / input.volume() - 1.0;
         (input.is_closed() && self.is_closed() && error.abs() > LARGEST_VOLUME_ERROR).then(|| {
             format!(
-                "the surface encloses {:.1} % {} than the input ({:.3} ml for {:.3} ml); use smaller triangles",
+                "the surface encloses {:.1} % {} than the input ({:.3} ml instead of {:.3} ml); use smaller \
+                 triangles",
                 100.0 * error.abs(),
                 if error < 0.0 { "less" } else { "more" },
                 self.volume() * 1e6,

@@ -57,7 +57,7 @@ impl fmt::Display for SurfaceRepairs {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let parts = [
             (self.joined_points, ["point", "points"], "joined"),
-            (self.dropped_faces, ["face", "faces"], "without area or duplicate dropped"),
+            (self.dropped_faces, ["face", "faces"], "dropped (duplicate or without area)"),
             (self.cut_edges, ["edge", "edges"], "of more than two faces split"),
             (self.turned_faces, ["face", "faces"], "turned"),
         ];

@@ -171,7 +171,8 @@ impl fmt::Display for Missed {
             ),
             Self::Behind { place, distance } => write!(
                 f,
-                "the mesh stays {:.1} mm behind the body at {}: a sharp crest, or a dropped small piece",
+                "the mesh boundary is {:.1} mm inside the body at {}: a sharp crest, or a dropped small \
+                 piece",
                 distance * 1e3,
                 at(place)
             ),

@@ -354,7 +354,7 @@ impl Repairs {
             writeln!(f, "left out         {dropped_cells} cells in {dropped_pieces} small pieces")?;
         }
         if bridges > 0 {
-            writeln!(f, "gaps cut out     {bridges} edges bridged gaps thinner than the lattice")?;
+            writeln!(f, "gaps cut out     {bridges} edges across gaps thinner than the lattice")?;
         }
         if crowded_edges > 0 {
             writeln!(
@@ -561,28 +561,29 @@ impl TetReport {
     pub fn doubts(&self) -> Vec<String> {
         let mut doubts = Vec::new();
         doubts.extend(LostReport::in_words(&self.lost).map(|lost| {
-            format!("the mesh lacks parts of the body: {lost}; a smaller edge keeps parts as thick as it")
+            format!("the mesh lacks parts of the body: {lost}; use an edge no longer than their thickness")
         }));
         if let Some(DistanceReport { asked, reached, to, .. }) = self.distance.filter(|d| d.reached > d.asked)
         {
             doubts.push(format!(
-                "the distance of {:.3} mm to {to} was not reached; the best mesh reaches {:.3} mm: a larger distance is, \
-                 or a surface without folds and specks",
+                "the distance of {:.3} mm to {to} was not reached; the best mesh reaches {:.3} mm: give a \
+                 larger distance, or a surface without folds and specks",
                 asked * 1e3,
                 reached * 1e3
             ));
         }
         if let (Some(CostlyPlace { place: [x, y, z], factor }), Some(_)) = (self.costly, self.distance) {
             doubts.push(format!(
-                "cells at ({x:.4}, {y:.4}, {z:.4}) m, made small to hold the distance there, make the step {factor:.1} times as short; \
-                 a larger distance, or a surface that is smoothed there, takes longer steps"
+                "small cells at ({x:.4}, {y:.4}, {z:.4}) m, which keep the distance, make the step \
+                 {factor:.1} times as short; for longer steps, give a larger distance or smooth the surface \
+                 there"
             ));
         }
         doubts.extend(self.surface.doubt());
         if let Tears { number, first: Some([x, y, z]) } = self.tears {
             doubts.push(format!(
-                "the mesh tears thin parts of the body in {number} places, the first at ({x:.4}, {y:.4}, {z:.4}) m; an edge below \
-                 their thickness keeps them whole"
+                "the mesh tears thin parts of the body in {number} places, the first at ({x:.4}, {y:.4}, \
+                 {z:.4}) m; use an edge shorter than their thickness"
             ));
         }
         if self.edges.longest_part > LONGEST + 1e-9 {

@@ -552,7 +552,10 @@ fn read_field(
     start_binary(numbers);
     let [_, components, count] = integers;
     let (Ok(components @ 1..=9), Ok(count)) = (usize::try_from(components), usize::try_from(count)) else {
-        let what = format!("{item} data `{title}` announce {count} items of {components} numbers");
+        let what = format!(
+            "{item} data `{title}` announce {count} items of {components} numbers, but an item has 1 to 9 \
+             numbers"
+        );
         return Err(numbers.cursor.malformed(what));
     };
     let each = if numbers.is_binary() { 4 + 8 * components } else { 2 + 2 * components };

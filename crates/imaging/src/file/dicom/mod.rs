@@ -199,7 +199,7 @@ pub(super) fn read_folder(
         image.notes.push(format!("{} other files in the folder were ignored", found.files - used));
     }
     if found.contours > 0 {
-        image.notes.push(format!("of these, RT structure sets (contours): {}", found.contours));
+        image.notes.push(format!("RT structure sets (contours) among the ignored files: {}", found.contours));
     }
     Ok(image)
 }
@@ -287,7 +287,7 @@ impl<'a> Frames<'a> {
         let count = elements.frames()?;
         let own = elements.items(0x5200_9230);
         if count > 1 && own.len() != count {
-            let what = format!("a file of {count} frames with the places of {}", own.len());
+            let what = format!("a file of {count} frames with the positions of {} frames", own.len());
             return Err(ImageProblem::Unsupported { what, remedy: EXPORT });
         }
         Ok(Self { elements, shared: elements.items(0x5200_9229).first(), own, count })
@@ -428,9 +428,9 @@ fn slice_step(slices: &[Slice], normal: &Vector3) -> Result<Vector3, ImageProble
     if let Some(at) = steps.iter().position(|own| (own - step).norm() > 0.1 * step.norm()) {
         return Err(ImageProblem::SliceDiffers {
             file: slices[at + 1].name.clone(),
-            what: "a step from the slice before of",
-            found: format!("{:?} mm", steps[at].as_slice()),
-            expected: format!("(like all others) {:?} mm", step.as_slice()),
+            what: "a step of",
+            found: format!("{:?} mm from the previous slice", steps[at].as_slice()),
+            expected: format!("{:?} mm, like all others", step.as_slice()),
         });
     }
     Ok(step)

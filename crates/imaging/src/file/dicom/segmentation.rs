@@ -71,8 +71,10 @@ pub(super) fn read(elements: &Elements<'_>, options: &ReadOptions) -> Result<Ima
             }
         }
     }
-    let mut notes =
-        vec!["the frames end with the segments: the scan may cut them off along its slices".to_owned()];
+    let mut notes = vec![
+        "the frames end where the segments end: the scan may cut off parts beyond the first or last slice"
+            .to_owned(),
+    ];
     if shared > 0 {
         notes
             .push(format!("segments overlap in {shared} voxels, which belong to the highest segment number"));
@@ -147,9 +149,9 @@ impl Stack {
         if let Some(frame) = places.iter().position(turned) {
             return Err(ImageProblem::SliceDiffers {
                 file: format!("frame {}", frame + 1),
-                what: "steps from pixel to pixel of",
+                what: "another orientation or pixel spacing:",
                 found: format!("{:?} mm", places[frame].steps.map(|step| step.norm())),
-                expected: format!("{:?} mm, another orientation or spacing", [along.norm(), down.norm()]),
+                expected: format!("{:?} mm", [along.norm(), down.norm()]),
             });
         }
         let heights: Vec<f64> = places.iter().map(|place| place.position.dot(&normal)).collect();
@@ -173,9 +175,9 @@ impl Stack {
             let odd = gaps.iter().copied().find(|&gap| !whole(least, gap)).unwrap_or(least);
             ImageProblem::SliceDiffers {
                 file: "a frame".to_owned(),
-                what: "a distance from the next one of",
+                what: "a distance to the next frame of",
                 found: format!("{odd:.3} mm"),
-                expected: format!("(like others) {least:.3} mm, or whole multiples of it"),
+                expected: format!("{least:.3} mm or a whole multiple, like the others"),
             }
         })?;
         let steps = ((high - low) / spacing).round();

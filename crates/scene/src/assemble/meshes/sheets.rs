@@ -183,7 +183,7 @@ mod tests {
                 "{ lens = { optic = 6e-3, overall = 5e-3, width = 5e-4, transition = 60, sweep = 140 }, edge = 3e-4 }",
                 "overall diameter beyond the optic is -0.001",
             ),
-            ("{ plate = { size = [1, 1], cells = [0, 2] } }", "0 cells asked for along x"),
+            ("{ plate = { size = [1, 1], cells = [0, 2] } }", "the number of cells along x is 0"),
             ("{ plate = { size = [1, 1], cells = [2, 2] }, as = 'hexes' }", "made of triangles"),
             ("{ plate = { size = [1, -1], cells = [2, 2] } }", "size along y is -1"),
             ("{ sphere = { radius = 1, levels = 40 } }", "exceed the limit"),
