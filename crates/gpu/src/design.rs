@@ -66,7 +66,7 @@ impl FromStr for Design {
 
 /// A name no design has.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("there is no design `{name}`; there are {}", Design::ALL.iter().map(Design::to_string).collect::<Vec<_>>().join(", "))]
+#[error("there is no design `{name}`; use one of {}", Design::ALL.iter().map(Design::to_string).collect::<Vec<_>>().join(", "))]
 pub struct UnknownDesign {
     /// The name.
     pub name: String,

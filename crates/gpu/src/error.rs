@@ -17,7 +17,7 @@ pub enum GpuError {
         found: Vec<String>,
     },
     /// The driver refused to open the adapter.
-    #[error("`{adapter}` can't be opened: {reason}")]
+    #[error("`{adapter}` cannot be opened: {reason}")]
     Refused {
         /// The adapter.
         adapter: String,
@@ -85,13 +85,13 @@ pub enum GpuError {
         what: String,
     },
     /// A design without contact.
-    #[error("the design `{design}` has no contact")]
+    #[error("the design `{design}` does not support contact")]
     NoContact {
         /// The design.
         design: String,
     },
     /// A design without ties.
-    #[error("the design `{design}` has no ties")]
+    #[error("the design `{design}` does not support ties")]
     NoTies {
         /// The design.
         design: String,
@@ -135,16 +135,17 @@ impl GpuError {
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::NoAdapter => {
-                "install a driver (Debian and Ubuntu: `mesa-vulkan-drivers libvulkan1`, or that of the vendor; Fedora: \
-                 `mesa-vulkan-drivers vulkan-loader`), see what is found with `pliant devices`, or take `device = \"cpu\"`"
+                "install a driver (Debian and Ubuntu: `mesa-vulkan-drivers libvulkan1`, or the vendor's \
+                 driver; Fedora: `mesa-vulkan-drivers vulkan-loader`), list the adapters with `pliant \
+                 devices`, or take `device = \"cpu\"`"
             }
             Self::UnknownAdapter { .. } => {
-                "`pliant devices` lists what is there; a part of the name is enough"
+                "`pliant devices` lists the adapters; a part of the name is enough"
             }
             Self::Refused { .. } => "update the driver, or take another adapter of `pliant devices`",
             Self::Lost { .. } => {
-                "run again, from the last checkpoint if there is one (`--resume`); if it comes back, update the driver \
-                 or take `device = \"cpu\"`"
+                "run again, from the last checkpoint if there is one (`--resume`); if the error returns, \
+                 update the driver or take `device = \"cpu\"`"
             }
             Self::OutOfMemory { .. } | Self::TooLarge { .. } => {
                 "take a coarser mesh, an adapter with more memory (`pliant devices`) or `device = \"cpu\"`"
@@ -158,7 +159,9 @@ impl GpuError {
                 "take the design `gather` or `fast`, or leave `design` out"
             }
             Self::Overflow { .. } => "take the design `gather`, whose forces are floating-point numbers",
-            Self::Contradiction(_) => "leave the node out of one of the two, or give both the same motion",
+            Self::Contradiction(_) => {
+                "leave the node out of one of the two constraints, or give both the same motion"
+            }
             Self::Internal { .. } => {
                 "take `device = \"cpu\"`, and report this: it is an error in Pliant or in the driver"
             }

@@ -86,7 +86,7 @@ impl DeviceMapping {
                 let rest = memory.filled("the points drawn", &rest)?;
                 let given = memory.zeros("the values drawn", count * size_of::<f32>())?;
                 let buffer = memory.zeros("the points drawn", count * size_of::<Four>())?;
-                let shown = memory.uniform("what is drawn", size_of::<[u32; 4]>());
+                let shown = memory.uniform("the settings of the drawing", size_of::<[u32; 4]>());
                 let bound = Bound::new(device, &[Binding::Moving(&shown, size_of::<[u32; 4]>() as u64)]);
                 let arrays = Bound::new(
                     device,

@@ -116,11 +116,11 @@ impl GpuShells {
             return Some(format!("the load `{}`, which acts on a surface or is controlled,", load.name));
         }
         let others = [
-            (model.facets.is_empty() || !model.solids.is_empty(), "a solid beside explicit shells"),
+            (model.facets.is_empty() || !model.solids.is_empty(), "a solid in a model of explicit shells"),
             (!model.springs.is_empty(), "a spring on explicit shells"),
             (!model.ties.is_empty() || !model.turns.is_empty(), "a tie of explicit shells"),
             (model.contact.is_some(), "contact of explicit shells"),
-            (!model.force_limits.is_empty(), "a motion of explicit shells with limited force"),
+            (!model.force_limits.is_empty(), "a `force-limit` on explicit shells"),
             (model.stiffness_damping > 0.0, "damping by stiffness of explicit shells"),
         ];
         others.into_iter().find(|(there, _)| *there).map(|(_, what)| what.to_owned())

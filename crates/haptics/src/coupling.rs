@@ -46,7 +46,7 @@ impl Coupling {
     /// Rejects stiffnesses and dampings out of range.
     pub(crate) fn check(&self) -> Result<(), HapticsError> {
         let Self { stiffness, damping } = *self;
-        let remedy = "give a positive one, 1000 N/m by default";
+        let remedy = "give a positive number, 1000 N/m by default";
         HapticsError::check("the stiffness of the coupling [N/m]", stiffness, stiffness > 0.0, remedy)?;
         let remedy = "give at least 0, 0.2 N s/m by default";
         HapticsError::check("the damping of the coupling [N s/m]", damping, damping >= 0.0, remedy)

@@ -59,7 +59,7 @@ pub enum HapticsError {
         address: SocketAddr,
     },
     /// A socket that can't be opened.
-    #[error("no datagrams at {address}: {source}; try another port, or 0 for a free one")]
+    #[error("cannot receive datagrams at {address}: {source}; try another port, or 0 for a free one")]
     Socket {
         /// The address.
         address: SocketAddr,

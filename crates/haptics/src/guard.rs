@@ -39,8 +39,8 @@ impl Guard {
     pub(crate) fn check(&self) -> Result<(), HapticsError> {
         let Self { most_damping, most_jump, reserve } = *self;
         for (what, value) in [
-            ("the most damping of the guard [N s/m]", most_damping),
-            ("the most jump of the guard [N]", most_jump),
+            ("the largest damping of the guard [N s/m]", most_damping),
+            ("the largest jump of the guard [N]", most_jump),
             ("the reserve of the guard [J]", reserve),
         ] {
             HapticsError::check(what, value, value >= 0.0, "give at least 0")?;

@@ -106,7 +106,12 @@ impl LocalModel {
             HapticsError::check("the friction of a plane", friction, friction >= 0.0, "give at least 0")?;
         }
         let fits = period > 0.0 && period <= LONGEST_PERIOD;
-        HapticsError::check("the period of a local model [s]", period, fits, "give one in (0, 1] s")?;
+        HapticsError::check(
+            "the period of a local model [s]",
+            period,
+            fits,
+            "give more than 0 s and at most 1 s",
+        )?;
         let scale = compliance.amax();
         let least = compliance.symmetric_eigenvalues().min();
         let skew = (compliance - compliance.transpose()).amax();

@@ -139,10 +139,10 @@ impl Renderer {
         coupling.check()?;
         let remedy = "give 0 to 0.01 s, half a period by default";
         HapticsError::check("the time ahead [s]", ahead, (0.0..=0.01).contains(&ahead), remedy)?;
-        let remedy = "give a positive one, 3.3 N by default";
+        let remedy = "give a positive number, 3.3 N by default";
         HapticsError::check("the force limit [N]", force_limit, force_limit > 0.0, remedy)?;
         if let Some(most) = most_change {
-            let remedy = "give a positive one, 0.3 N a tick is hardly felt";
+            let remedy = "give a positive number; 0.3 N per tick is hardly felt";
             HapticsError::check("the largest change of the force [N]", most, most > 0.0, remedy)?;
         }
         HapticsError::check("the soft start [s]", soft_start, soft_start >= 0.0, "give at least 0")?;

@@ -52,7 +52,8 @@ impl Trace {
             let mut numbers = [0.0; 8];
             let mut count = 0;
             for word in row.split(',').map(str::trim) {
-                let number: f64 = word.parse().map_err(|_| wrong(line, format!("`{word}` is no number")))?;
+                let number: f64 =
+                    word.parse().map_err(|_| wrong(line, format!("`{word}` is not a number")))?;
                 if !number.is_finite() {
                     return Err(wrong(line, format!("`{word}` is not finite")));
                 }
@@ -137,7 +138,7 @@ impl Trace {
         frequency: f64,
         duration: f64,
     ) -> Result<Self, HapticsError> {
-        HapticsError::check("a frequency [Hz]", frequency, true, "give a finite one")?;
+        HapticsError::check("a frequency [Hz]", frequency, true, "give a finite number")?;
         Self::of(from, duration, |time| way * (TAU * frequency * time).sin())
     }
 
@@ -153,7 +154,7 @@ impl Trace {
         duration: f64,
     ) -> Result<Self, HapticsError> {
         for time in [rise, hold] {
-            HapticsError::check("a time of a step [s]", time, time > 0.0, "give a positive one")?;
+            HapticsError::check("a time of a step [s]", time, time > 0.0, "give a positive number")?;
         }
         Self::of(from, duration, |time| {
             let (turn, within) = ((time / hold).floor(), time % hold);
@@ -191,7 +192,12 @@ impl Trace {
         mut shift: impl FnMut(f64) -> Vector3<f64>,
     ) -> Result<Self, HapticsError> {
         let fits = duration > 0.0 && duration <= LONGEST;
-        HapticsError::check("the duration of a trace [s]", duration, fits, "give one in (0, 3600] s")?;
+        HapticsError::check(
+            "the duration of a trace [s]",
+            duration,
+            fits,
+            "give more than 0 s and at most 3600 s",
+        )?;
         let number = (duration / PERIOD).round() as u32;
         let poses = (0..=number).map(|tick| {
             let time = f64::from(tick) * PERIOD;

@@ -87,11 +87,12 @@ impl SeriesError {
             Self::NoSeries(_) => {
                 "give a scene, or the folder of a run whose scene has an output of type `vtu`"
             }
-            Self::UnknownSeries { .. } => "use one of these",
+            Self::UnknownSeries { .. } => "use one of its series",
             Self::NoFrames(_) => "run the scene again",
             Self::File(_) => "",
             Self::NoField { .. } => {
-                "use one of these, a component such as `displacement:z` or `cauchy-stress:xx`, or `none`"
+                "use one of these fields, a component such as `displacement:z` or `cauchy-stress:xx`, or \
+                 `none`"
             }
             Self::NoFibres => {
                 "show a body whose law has fibres; a finished run needs `fibre` in `data` of its output, `at = \"cells\"`"
@@ -103,7 +104,8 @@ impl SeriesError {
                 "show bodies that touch something; a finished run needs `contact-force` in `data` of its output"
             }
             Self::NoMarks => {
-                "a finished run needs `constraint` and `load` in `data` of an output of bodies, of the same instants"
+                "a finished run needs `constraint` and `load` in `data` of an output of bodies, at the same \
+                 times"
             }
             Self::NoLabels => {
                 "show bodies whose mesh has cell data `label`, such as meshes from images with several labels"

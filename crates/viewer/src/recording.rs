@@ -172,7 +172,7 @@ impl Recording {
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, String> {
         let Some((content, crc)) = bytes.split_last_chunk::<CRC>().filter(|_| bytes.starts_with(&MAGIC))
         else {
-            return Err("it does not begin as one of this version".into());
+            return Err("its first bytes are not the header of this version of pliant".into());
         };
         let body = content.get(MAGIC.len()..).filter(|_| crc32fast::hash(content).to_le_bytes() == *crc);
         body.and_then(|body| postcard::from_bytes(body).ok()).ok_or_else(|| "it is damaged or cut off".into())

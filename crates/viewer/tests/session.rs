@@ -310,14 +310,14 @@ fn a_pull_of_long_ago_is_taken_back_without_going_to_the_start() {
         let back = wait(&mut session, |frame| frame.steps < 2 * pulled);
         assert!((pulled / 2..=pulled).contains(&back.steps), "back at step {} of {pulled}", back.steps);
     }
-    // Step by step, it ends at the oldest state that is kept, and says so.
+    // Step by step, it ends at the oldest kept state, and says so.
     loop {
         let now = session.look().1.clone();
         session.order(Order::Back(now.steps.saturating_sub(1)));
         let back = wait(&mut session, |frame| frame.number > now.number);
         assert!(back.steps > 0);
         if back.steps == now.steps {
-            assert!(back.note.unwrap().contains("the oldest state that is kept"));
+            assert!(back.note.unwrap().contains("the oldest kept state"));
             break;
         }
     }
@@ -338,7 +338,7 @@ fn numbers_that_ruin_a_run_are_taken_back() {
         let refused = wait(&mut session, |frame| frame.failure.is_some() || frame.refusals == 1);
         assert_eq!((refused.failure, refused.numbers.len()), (None, 0));
         let note = refused.note.unwrap();
-        assert!(note.contains("they go back to those before") && note.contains("is inverted"), "{note}");
+        assert!(note.contains("the former numbers are back") && note.contains("is inverted"), "{note}");
         session.order(Order::Play(false));
         let after = wait(&mut session, |frame| !frame.playing);
         assert!(after.steps >= 600 && (after.hand(Which::First).unwrap()[0][0] - held.x).abs() < 1e-2);

@@ -137,7 +137,7 @@ impl GpuStepper {
     ) -> Result<Self, GpuError> {
         let owners = model.constrained_components()?;
         if let Some(constraint) = model.collective() {
-            let what = format!("the constraint `{}`, which binds nodes to each other", constraint.name);
+            let what = format!("the constraint `{}`, which binds nodes to each other,", constraint.name);
             return Err(GpuError::Unsupported { what });
         }
         let memory = Memory::new(device);

@@ -329,7 +329,7 @@ fn contact_is_refused_where_the_solver_or_the_device_has_none() {
         ),
         (
             pressed("device = 'gpu'\ndesign = 'blocks'", ""),
-            ["the design `blocks` has no contact", "`gather`"],
+            ["the design `blocks` does not support contact", "`gather`"],
         ),
         (
             pressed("device = 'gpu'", "")

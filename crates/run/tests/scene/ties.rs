@@ -477,7 +477,7 @@ fn tied_bodies_move_on_a_device_as_on_the_processor() {
     });
     assert!(a.len() > 30 && a == b, "{a:?}\n{b:?}");
     let refused = world(&vessel_text("device = 'gpu'\ndesign = 'blocks'")).err().unwrap();
-    assert!(refused.contains("`blocks` has no ties") && refused.contains("`gather`"), "{refused}");
+    assert!(refused.contains("`blocks` does not support ties") && refused.contains("`gather`"), "{refused}");
 }
 
 #[cfg(feature = "gpu")]

@@ -185,8 +185,9 @@ impl Playback {
             recording.breaks.truncate(breaks);
         }
         self.refusals += 1;
-        self.note =
-            Some(format!("the changed numbers break the run, so they go back to those before: {reason}"));
+        self.note = Some(format!(
+            "the run failed with the changed numbers, so the former numbers are back: {reason}"
+        ));
         former.state.clone()
     }
 

@@ -135,7 +135,7 @@ impl<'s> Player<'s> {
         live.simulation.stop_on(&playback.stop);
         if !goes_on && playback.steps > 0 {
             playback.start_anew();
-            playback.note = Some("the mesh or the solver is another one: it starts anew".into());
+            playback.note = Some("the mesh or the solver has changed: the run starts anew".into());
         }
         playback.hold.grip_again(&mut live);
         let on_device = world.device().is_some();
@@ -312,7 +312,7 @@ impl<'s> Player<'s> {
         let held = self.playback.hold.take(which, hand, &self.subject, &mut self.live);
         let playback = &mut self.playback;
         if !held {
-            playback.note = Some("this solver knows no hand: it does not pull".into());
+            playback.note = Some("this solver does not support pulling by hand".into());
         } else if matches!(hand, Hand::Take(..) | Hand::Pin(_)) {
             playback.note = None;
         }
@@ -474,8 +474,7 @@ impl<'s> Player<'s> {
         let sound = self.sound.before(steps, self.world.step());
         if let Some(time) = sound.and_then(|sound| self.restore(sound)) {
             let playback = &mut self.playback;
-            let oldest =
-                if playback.steps > steps { ", the oldest state that is kept: R starts anew" } else { "" };
+            let oldest = if playback.steps > steps { ", the oldest kept state: R starts anew" } else { "" };
             playback.failure = None;
             playback.note = Some(format!("the run went back to t = {} s{oldest}", number(time)));
         }

@@ -58,7 +58,7 @@ fn list(ui: &mut egui::Ui, names: &RegionNames, hide: &mut Vec<CellLabel>, looks
                     ui.painter().rect_filled(place, 2.0, egui::Color32::from_rgb(r, g, b));
                 }
                 let mut shown = !hidden.contains(region);
-                if ui.checkbox(&mut shown, text).on_hover_text("shows it, or leaves it out").changed() {
+                if ui.checkbox(&mut shown, text).on_hover_text("shows or hides it").changed() {
                     hidden.retain(|other| other != region);
                     hidden.extend((!shown).then_some(*region));
                 }
@@ -121,7 +121,7 @@ fn edit_look(ui: &mut egui::Ui, name: &str, look: &mut LookTable) -> bool {
     ui.add_space(18.0);
     ui.spacing_mut().slider_width = 60.0;
     ui.add(egui::Slider::new(&mut look.opacity, LEAST..=1.0).max_decimals(2))
-        .on_hover_text("opacity: below 1 one sees what lies inside and behind");
+        .on_hover_text("opacity: below 1, the inside and the background show through");
     let word = |colour: LookColour| LookColour::WORDS[colour as usize];
     egui::ComboBox::from_id_salt(("look", name)).selected_text(word(look.colour)).width(70.0).show_ui(
         ui,

@@ -67,7 +67,7 @@ impl App {
         let name = &points.device().adapter().name;
         let rate = (1.0 / INSPECTION.as_secs_f64()).round();
         Some(match (self.in_memory, point_value(self.shown_name().as_deref())) {
-            (true, _) => format!("on {name}; points come back for the section"),
+            (true, _) => format!("on {name}; points are copied back for the section"),
             (false, PointValue::Given) => {
                 format!("drawn on {name}; colours, energies and forces {rate} times a second")
             }

@@ -39,7 +39,7 @@ impl App {
         let now = Instant::now();
         let Some([since, _]) = self.filming.since.take() else {
             self.filming = Filming { since: Some([now, now - BETWEEN]), ..Filming::default() };
-            self.message = Some(Told::hint("a film is taken: *Film* or V ends it"));
+            self.message = Some(Told::hint("recording a film: *Film* or V ends it"));
             return;
         };
         let pictures = std::mem::take(&mut self.filming.pictures);
@@ -56,7 +56,7 @@ impl App {
             context.request_repaint();
         });
         self.filming.written = Some(receive);
-        self.message = Some(Told::hint("the film is written …"));
+        self.message = Some(Told::hint("writing the film …"));
     }
 
     /// Takes the next picture of a film when it is due.

@@ -322,13 +322,13 @@ impl Finished {
             let steps = [("|<", "Home: the first frame", isize::MIN), ("<", "←: one frame back", -1)];
             let steps = steps
                 .into_iter()
-                .chain([(">", "→: one frame on", 1), (">|", "End: the last frame", isize::MAX)]);
+                .chain([(">", "→: one frame forward", 1), (">|", "End: the last frame", isize::MAX)]);
             for (word, does, by) in steps {
                 if ui.button(word).on_hover_text(does).clicked() {
                     self.step(by);
                 }
             }
-            ui.checkbox(&mut self.timeline.looped, "Loop").on_hover_text("at the end, starts again");
+            ui.checkbox(&mut self.timeline.looped, "Loop").on_hover_text("starts again at the end");
             make_room(ui, SPEED);
             let speed = egui::Slider::new(&mut self.timeline.speed, 0.01..=100.0).logarithmic(true);
             ui.add(speed.text("× real time"));

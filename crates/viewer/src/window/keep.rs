@@ -207,7 +207,7 @@ impl App {
         }
         if ui
             .selectable_label(self.filming.is_on(), "Film")
-            .on_hover_text("V: begins a film, and ends and writes it beside the scene")
+            .on_hover_text("V: begins a film; V again ends it and writes it beside the scene")
             .clicked()
         {
             self.film();
@@ -219,7 +219,7 @@ impl App {
         let button = egui::Button::new("Save scene");
         make_room(ui, 90.0);
         let button = ui.add_enabled(!changed.is_empty(), button);
-        if button.on_hover_text("writes the scene with the changed numbers beside it").clicked() {
+        if button.on_hover_text("writes the scene with the changed numbers as NAME-changed.toml").clicked() {
             let (text, elsewhere) = text_with(&self.world.scene.source, &changed);
             let written = told(write_beside(&self.file, "changed", "toml", text.as_bytes()));
             self.message = Some(match elsewhere.is_empty() {
@@ -239,8 +239,7 @@ impl App {
     /// Copies the view to the clipboard.
     pub(super) fn copy_view(&mut self) {
         self.context.copy_text(self.view_text());
-        self.message =
-            Some(Told::done("the table [view] was copied: paste it into the scene in place of its own"));
+        self.message = Some(Told::done("the table [view] was copied: paste it over the [view] of the scene"));
     }
 
     /// The view as a table of a scene.

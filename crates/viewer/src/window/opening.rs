@@ -61,7 +61,7 @@ impl Browser {
         ui.horizontal(|ui| {
             let above = self.folder.parent();
             let up = ui.add_enabled(above.is_some(), egui::Button::new("Up"));
-            if up.on_hover_text("to the folder around").clicked() {
+            if up.on_hover_text("to the parent folder").clicked() {
                 next = above.map(Path::to_owned);
             }
             ui.label(self.folder.display().to_string());

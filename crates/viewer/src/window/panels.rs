@@ -204,7 +204,7 @@ impl App {
             });
         }
         if is_shell {
-            let parts = egui::Slider::new(&mut self.view.curved, 1..=12).text("parts of an edge");
+            let parts = egui::Slider::new(&mut self.view.curved, 1..=12).text("parts per edge");
             ui.add(parts)
                 .on_hover_text("how finely the curved surface of shells is drawn; 1: flat triangles");
         }
@@ -237,14 +237,14 @@ impl App {
         let is_relaxed =
             |part: &Part| part.scene.run.solver == SolverName::QuasiStatic && part.built.implicit.is_none();
         if self.world.participants.iter().any(is_relaxed) {
-            ui.weak("the solver `quasi-static` knows no hand; `static` and `implicit` do");
+            ui.weak("the solver `quasi-static` does not support pulling by hand; use `static` or `implicit`");
             return;
         }
         ui.add(egui::Slider::new(&mut self.stiffness, 1.0..=5000.0).logarithmic(true).text("N/m"));
         let pulls = Which::BOTH.map(|which| Some(Vector3::from(self.frame.hand(which)?[1]).norm()));
         ui.label(match pulls {
-            [Some(first), Some(second)] => format!("pull with {first:.3} N and {second:.3} N"),
-            [Some(newtons), None] | [None, Some(newtons)] => format!("pulls with {newtons:.3} N"),
+            [Some(first), Some(second)] => format!("the hands pull with {first:.3} N and {second:.3} N"),
+            [Some(newtons), None] | [None, Some(newtons)] => format!("the hand pulls with {newtons:.3} N"),
             [None, None] => "drag the body to pull it".into(),
         });
         let pins = self.frame.pins().len();

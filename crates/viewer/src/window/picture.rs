@@ -31,12 +31,12 @@ const KEYS: [(&str, &str); 29] = [
     ),
     (
         "B while dragging",
-        "keep it with this hand, go on with the other one; drag what is kept to take it again",
+        "hold it with this hand and use the other hand; drag the held place to take it again",
     ),
-    ("B", "let go what the other hand keeps"),
-    ("Ctrl or P + click", "pin it; on a pin, take it away"),
+    ("B", "release the other hand"),
+    ("Ctrl or P + click", "pin it; on a pin, remove it"),
     ("Alt or I + click", "follow a point: read and plot it; two give their distance"),
-    ("drag beside it", "turn the view"),
+    ("drag the background", "turn the view"),
     ("right drag", "turn the view; with Shift move it"),
     ("middle drag", "move the view"),
     ("wheel", "zoom"),
@@ -46,7 +46,7 @@ const KEYS: [(&str, &str); 29] = [
     ("Ctrl and Z", "take back a pull, a pin or changed numbers"),
     ("R", "start anew"),
     ("F", "see all"),
-    ("0", "look as at the start"),
+    ("0", "view as at the start"),
     ("1 2 3 4 5 6", "see all from the front, back, left, right, top, bottom"),
     ("E G C", "edges, shape at rest, section"),
     ("L", "lock the range of colours"),
@@ -270,7 +270,7 @@ impl App {
                 frame.real_time_factor, frame.possible_factor
             ));
             if frame.real_time_factor < 0.95 * self.speed && frame.possible_factor < 1.05 * self.speed {
-                lines.push("this machine cannot keep up: time goes slower".into());
+                lines.push("this machine cannot keep up: time runs slower".into());
             }
         }
         lines.push(format!(

@@ -149,7 +149,7 @@ impl App {
             ui.selectable_value(&mut self.lately, false, "all").on_hover_text("plots the whole run");
             ui.selectable_value(&mut self.lately, true, "last 10 s")
                 .on_hover_text("plots the last ten simulated seconds");
-            if self.probes > 0 && ui.button("Forget the points followed").clicked() {
+            if self.probes > 0 && ui.button("Forget the followed points").clicked() {
                 self.forget_probes();
                 self.order(Order::ForgetProbes);
             }

@@ -17,7 +17,7 @@ use pliant_picture::{
 use super::paint::{Paint, SAMPLES, place};
 
 /// Description of the occlusion for the user.
-pub(super) const OCCLUSION: &str = "folds and contacts are darker, where less light arrives";
+pub(super) const OCCLUSION: &str = "darkens folds and contacts, where less light arrives";
 /// Width of the scale of colours on the screen.
 const SCALE: f32 = 110.0;
 /// Radius of the ring around the largest value on the screen.
@@ -582,7 +582,8 @@ impl Viewport {
                     self.locked = true;
                 } else {
                     refused = Some(format!(
-                        "the range of colours must begin below its end; found {low} to {high} {unit}, it stays as it was"
+                        "the range of colours, {low} to {high} {unit}, must begin below its end; the former \
+                         range stays"
                     ));
                 }
             }

@@ -344,6 +344,6 @@ fn a_design_without_ties_is_named() {
     let model = relaxing();
     let refused = GpuStepper::new(&device, model, 1e-3, Some(Design::Blocks)).err().unwrap();
     assert_eq!(refused, GpuError::NoTies { design: "blocks".into() });
-    assert!(refused.to_string().contains("`blocks` has no ties") && refused.is_about_the_model());
+    assert!(refused.to_string().contains("`blocks` does not support ties") && refused.is_about_the_model());
     assert!(refused.remedy().contains("gather"));
 }

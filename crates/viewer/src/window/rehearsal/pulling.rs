@@ -62,7 +62,7 @@ fn two_hands_pull_and_keep() {
     window.drag("the second hand pulls, too", place, |app| holds(app) == [true, true]);
     window.release("the second hand lets go", |app| holds(app) == [true, false]);
     let place = kept(window.app());
-    window.drag("what is kept is taken again", place, |app| {
+    window.drag("the mouse takes the kept grip again", place, |app| {
         app.mouse == Which::First && holds(app) == [true, false]
     });
     window.release("the first hand lets go", |app| holds(app) == [false, false]);
@@ -70,7 +70,7 @@ fn two_hands_pull_and_keep() {
     window.drag("the first hand pulls", place, |app| holds(app) == [true, false]);
     window.key("B keeps it", Key::B, |app| app.mouse == Which::Second);
     window.release("the first hand holds on", |app| holds(app) == [true, false]);
-    window.key("B lets go what is kept", Key::B, |app| holds(app) == [false, false]);
+    window.key("B lets the kept grip go", Key::B, |app| holds(app) == [false, false]);
 }
 
 /// Returns the place of the first hand's grip on the screen.
@@ -98,7 +98,7 @@ fn pulled(scene: &str) -> Option<Replayed> {
         app.frame.hand(app.mouse).is_some_and(|[_, force]| Vector3::from(force).norm() > 0.0)
     });
     let began = window.app().frame.time;
-    window.wait("what is pulled comes to rest", |app| {
+    window.wait("the pulled body comes to rest", |app| {
         assert_eq!(app.frame.failure, None);
         app.frame.time - began >= SETTLING
     });

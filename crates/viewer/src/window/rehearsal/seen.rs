@@ -18,7 +18,7 @@ pub(crate) fn known_pixels(app: &App) -> impl Iterator<Item = (Pos2, u32)> + '_ 
 
 /// The place of the pixel of that number.
 pub(crate) fn known_place(app: &App, number: usize) -> Pos2 {
-    known_pixels(app).nth(number).expect("the body covers so many pixels").0
+    known_pixels(app).nth(number).expect("the body covers enough pixels").0
 }
 
 /// A pixel on the body, well inside it.
