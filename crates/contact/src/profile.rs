@@ -16,7 +16,7 @@ pub struct Corner {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ProfileError {
     /// Too few corners.
-    #[error("an outline has two points or more")]
+    #[error("an outline needs at least two points")]
     TooShort,
     /// A corner at a negative distance from the axis, or on it between the ends.
     #[error("point {0} of the outline lies on the axis or beyond; only the first and the last may be on it")]
@@ -25,11 +25,12 @@ pub enum ProfileError {
     #[error("points {0} and {1} of the outline are in one place")]
     Same(usize, usize),
     /// A corner that turns by no radius, or back.
-    #[error("point {0} of the outline needs a rounding above 0, and may not turn back")]
+    #[error("point {0} of the outline needs a rounding above 0, and the outline may not turn back there")]
     Sharp(usize),
     /// Arcs that overlap.
     #[error(
-        "the roundings of points {0} and {1} of the outline need {2} m between them, where there are {3} m"
+        "the roundings of points {0} and {1} of the outline need {2} m between them, but the points are {3} \
+         m apart; use smaller roundings"
     )]
     TooRound(usize, usize, f64, f64),
 }

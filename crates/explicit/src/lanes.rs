@@ -190,7 +190,8 @@ impl std::fmt::Display for Instructions {
 /// Instructions that this processor or this build does not have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "this processor has no `{wanted}` instructions that pliant was built for; the widest it has are `{widest}`"
+    "this processor has no `{wanted}` instructions, or pliant was built without them; the widest available \
+     are `{widest}`"
 )]
 pub struct MissingInstructions {
     /// Instructions that were asked for.

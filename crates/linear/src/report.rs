@@ -17,10 +17,10 @@ pub struct LinearReport {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LinearError {
     /// More equations than factors can number.
-    #[error("there are more equations than factors can number")]
+    #[error("there are too many equations for the direct solver")]
     TooLarge,
     /// Factors that the system has no room for, and how much of it they take where that is known.
-    #[error("the factors have no room{}", .0.map_or_else(String::new, |needed| format!(": {needed}")))]
+    #[error("not enough memory for the factors{}", .0.map_or_else(String::new, |needed| format!(": {needed}")))]
     OutOfMemory(Option<OutOfMemory>),
     /// The device failed.
     #[error("{0}")]
@@ -29,10 +29,10 @@ pub enum LinearError {
     #[error("the matrix is not finite")]
     NotFinite,
     /// A direction has no positive stiffness, after this number of iterations.
-    #[error("after {0} iterations a direction has no positive stiffness")]
+    #[error("conjugate gradients found a direction without positive stiffness after {0} iterations")]
     Indefinite(usize),
     /// Iterations ran out; the report of the state reached.
-    #[error("after {} iterations the residual is {:e}", .0.iterations, .0.residual)]
+    #[error("conjugate gradients stopped after {} iterations, residual {:e}", .0.iterations, .0.residual)]
     Stalled(LinearReport),
 }
 

@@ -116,15 +116,15 @@ impl RelaxationError {
             Self::Inverted { time, .. } | Self::NotConverged { time, .. } | Self::NotFinite { time, .. }
                 if *time == 0.0 =>
             {
-                "what acts at t = 0 comes at once: let it grow over time (`curve = \"smooth-step\"`), or make it smaller; a body \
-                 that nothing holds has no equilibrium"
+                "loads and motions at t = 0 act at once: let them grow over time \
+                 (`curve = \"smooth-step\"`), or make them smaller; a body that nothing holds has no equilibrium"
             }
             Self::NotConverged { .. } => {
                 "try more load steps, a looser tolerance or double precision; a body that nothing holds has no equilibrium"
             }
             Self::Inverted { .. } => "try more load steps, a smaller motion, or a finer mesh there",
             Self::NotFinite { .. } => "try more load steps; a body that nothing holds has no equilibrium",
-            Self::Stopped { .. } => "the state is that of the equilibrium before",
+            Self::Stopped { .. } => "the state is the previous equilibrium",
         }
     }
 }

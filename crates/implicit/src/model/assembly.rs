@@ -544,7 +544,7 @@ fn check_layers(shell: &Shell) -> Result<(), ModelError> {
     for (number, layer) in shell.layers.iter().enumerate() {
         let what = |what: &str| format!("{what} of layer {number}");
         if !layer.elastic.is_stable() {
-            let range = "so that every deformation costs energy: moduli above 0, and its square below E₁/E₂";
+            let range = "below √(E₁/E₂) in size, with moduli above 0, so that every deformation costs energy";
             return out_of_range(what("Poisson's ratio"), layer.elastic.poisson, range);
         }
         for (name, value) in [("thickness", layer.thickness), ("density", layer.density)] {

@@ -29,7 +29,7 @@ pub enum ModelError {
         why: &'static str,
     },
     /// Not one value and not one a cell.
-    #[error("shell `{shell}` has {cells} elements and {given} {what}; give one, or one an element")]
+    #[error("shell `{shell}` has {cells} elements and {given} {what}; give one, or one for each element")]
     Count {
         /// Name of the part.
         shell: String,
@@ -81,7 +81,8 @@ pub enum ModelError {
     },
     /// Layers without a direction.
     #[error(
-        "the direction of the layers of `{shell}` is perpendicular to element {cell}, or zero: their angles count from nothing there"
+        "the direction of the layers of `{shell}` is perpendicular to element {cell}, or zero, so the angles \
+         of the layers are undefined there; choose another direction"
     )]
     Direction {
         /// Name of the part.
@@ -103,8 +104,8 @@ pub enum ModelError {
     },
     /// A surface with one side only.
     #[error(
-        "shell `{shell}` has no two sides: following its triangles round comes back reversed at the edge of nodes \
-         {} and {}; cut it there", edge[0], edge[1]
+        "shell `{shell}` has only one side, like a Möbius strip: its triangles cannot all have the same \
+         orientation at the edge of nodes {} and {}; cut it there", edge[0], edge[1]
     )]
     OneSided {
         /// Name of the part.
@@ -170,7 +171,8 @@ pub enum SolveError {
     },
     /// Conjugate gradients did not reach their tolerance.
     #[error(
-        "conjugate gradients stand at a residual of {residual:.1e} after {iterations} iterations; allow more or use the direct solver"
+        "conjugate gradients stopped at a residual of {residual:.1e} after {iterations} iterations; allow \
+         more iterations or use the direct solver"
     )]
     Stalled {
         /// Iterations done.
@@ -204,8 +206,8 @@ pub enum SolveError {
     },
     /// A tool or a prescribed motion that cannot move further.
     #[error(
-        "{}{}: on to t = {time:.6} it has gone {:.1} % of its way after {iterations} iterations; nothing is in anything else. \
-         Give it a `force-limit`, let it go less far or more slowly, or take smaller steps",
+        "{}{}: stopped at {:.1} % of the step to t = {time:.6} after {iterations} iterations; no bodies \
+         intersect. Give it a `force-limit`, a shorter or slower motion, or smaller steps",
         blocked(driver.as_ref()), gap_left(*gap), 100.0 * part
     )]
     Blocked {
@@ -224,8 +226,8 @@ pub enum SolveError {
     /// A volume and the limit of its pressure that cannot both be kept: the state leaps from one side of them
     /// to the other.
     #[error(
-        "neither the volume of `{constraint}` nor its `pressure-limit` of {limit:.4e} Pa can be kept at t = {time:.6}: {}: the surface snaps; \
-         try {}smaller steps or a higher `pressure-limit`",
+        "neither the volume of `{constraint}` nor its `pressure-limit` of {limit:.4e} Pa can be kept at t = \
+         {time:.6}: {}. The surface snaps through; try {}smaller steps or a higher `pressure-limit`",
         in_vain(*pressure, *ahead), if *inertia { "" } else { "the solver `implicit`, " }
     )]
     Snaps {
@@ -247,7 +249,8 @@ pub enum SolveError {
     },
     /// No lower energy along a direction that should have one.
     #[error(
-        "the energy does not fall any more at t = {time:.6} after {iterations} iterations in contact, largest residual at node {node}; try smaller steps"
+        "the energy stopped falling at t = {time:.6} after {iterations} iterations in contact, largest \
+         residual at node {node}; try smaller steps"
     )]
     Uphill {
         /// Time of the step that failed.
@@ -259,8 +262,9 @@ pub enum SolveError {
     },
     /// An edge in a triangle, found by the check of intersections.
     #[error(
-        "{count} edges go through triangles at t = {time:.6}, the first that of nodes {} and {} through the triangle of nodes {}, {} and {} in contact \
-         {contact}: a fault of the program, please report it with the scene", edge[0], edge[1], triangle[0], triangle[1], triangle[2]
+        "{count} edges pass through triangles at t = {time:.6}. The first joins nodes {} and {} and passes \
+         through the triangle of nodes {}, {} and {} in contact {contact}. This is a fault of the program: \
+         please report it with the scene", edge[0], edge[1], triangle[0], triangle[1], triangle[2]
     )]
     Crossed {
         /// Time of the state.
@@ -279,7 +283,8 @@ pub enum SolveError {
     Device(DeviceError),
     /// The system has no room for the factors of the equations; how much they take, where that is known.
     #[error(
-        "no room for the factors of the equations{}; use `linear = {{ by = \"conjugate-gradients\" }}`, or a coarser mesh",
+        "not enough memory for the factors of the equations{}; use \
+         `linear = {{ by = \"conjugate-gradients\" }}`, or a coarser mesh",
         .0.map_or(String::new(), |needed| format!(": {needed}"))
     )]
     OutOfMemory(Option<OutOfMemory>),
@@ -321,7 +326,7 @@ impl SolveError {
 fn residual_in_words(residuals: &[f64]) -> String {
     match residuals.last() {
         Some(last) if last.is_finite() => format!("residual {last:.3e}"),
-        _ => "forces beyond all numbers".into(),
+        _ => "forces that are not finite".into(),
     }
 }
 
@@ -336,7 +341,7 @@ fn in_larger_steps(found: Option<(usize, Broken)>) -> String {
 }
 
 fn in_vain(pressure: Option<f64>, ahead: Option<f64>) -> String {
-    let pressure = pressure.map(|pressure| format!("the volume takes {pressure:.4e} Pa"));
+    let pressure = pressure.map(|pressure| format!("the volume needs {pressure:.4e} Pa"));
     let ahead = ahead.map(|ahead| format!("at the limit the volume is {ahead:.1e} m³ beyond its curve"));
     pressure.into_iter().chain(ahead).collect::<Vec<_>>().join(", and ")
 }

@@ -551,15 +551,18 @@ pub(crate) fn refusal(solid: &Solid) -> Option<&'static str> {
     };
     match averaging {
         Some(Averaging::Variational) => Some(
-            "`tet4-ianp` couples each tetrahedron with two rings of neighbours, which no stiffness is made for; take `tet4-anp`",
+            "`tet4-ianp` couples each tetrahedron with two rings of neighbours, and its stiffness is not \
+             available; take `tet4-anp`",
         ),
         Some(Averaging::NiftySim) => Some("this average is not the gradient of an energy; take `tet4-anp`"),
         _ if solid.cells.averages_pressure() && !solid.material.prony.volumetric.is_empty() => Some(
-            "its element averages the pressure, and that relaxes; take `tet4` or `hex8`, or the solver `quasi-static` or `explicit`",
+            "its element averages the pressure, but the volumetric part of its law relaxes; take `tet4` or \
+             `hex8`, or the solver `quasi-static` or `explicit`",
         ),
-        _ if matches!(solid.cells, Cells::Bar(..)) && !solid.material.prony.is_elastic() => {
-            Some("a bar that relaxes has no stiffness yet; take the solver `quasi-static` or `explicit`")
-        }
+        _ if matches!(solid.cells, Cells::Bar(..)) && !solid.material.prony.is_elastic() => Some(
+            "the stiffness of a viscoelastic bar is not available; take the solver `quasi-static` or \
+             `explicit`",
+        ),
         _ if solid.cells.averages_pressure() && !solid.material.law.has_volumetric_energy() => Some(
             "its element averages the pressure, and its law has no energy of the volume alone; take `tet4` or `hex8`",
         ),

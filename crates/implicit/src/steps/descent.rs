@@ -500,7 +500,7 @@ fn find_direction(solver: &mut impl Contacting, raised: &mut f64) -> Result<(f64
         *raised = (growth * added).max(first);
     }
     Err(SolveError::Impossible(
-        "the stiffness in contact is not positive definite, whatever is added to it; take smaller steps",
+        "the stiffness in contact is not positive definite, even with a raised diagonal; take smaller steps",
     ))
 }
 

@@ -56,12 +56,13 @@ impl ExplicitShells {
         }
         if model.collective().is_some() {
             return Err(SolveError::Impossible(
-                "explicit shells have no mean, no rigid part and no volume; use the implicit solver",
+                "explicit shells do not support constraints of means, rigid parts or volumes; use the \
+                 implicit solver",
             ));
         }
         if !model.turns.is_empty() {
             return Err(SolveError::Impossible(
-                "rotations of explicit shells follow no solid; use the implicit solver",
+                "explicit shells do not support rotations that follow a solid; use the implicit solver",
             ));
         }
         if model.stiffness_damping > 0.0 {

@@ -276,11 +276,11 @@ mod tests {
         let message = |valve: &Valve, inertia| valve.snaps(&model, 0.5, inertia).to_string();
         assert!(!valve.take([-500.0, 1e-6, 1e-3]));
         let start = "neither the volume of `air` nor its `pressure-limit` of 5.0000e2 Pa can be kept at t = 0.500000: ";
-        let ahead = "at the limit the volume is 1.0e-6 m³ beyond its curve: the surface snaps; try ";
+        let ahead = "at the limit the volume is 1.0e-6 m³ beyond its curve. The surface snaps through; try ";
         let advice = "smaller steps or a higher `pressure-limit`";
         assert_eq!(message(&valve, true), format!("{start}{ahead}{advice}"));
         assert!(!valve.take([-600.0, 0.0, 1e-3]));
-        let pressure = "the volume takes -6.0000e2 Pa, and ";
+        let pressure = "the volume needs -6.0000e2 Pa, and ";
         assert_eq!(
             message(&valve, false),
             format!("{start}{pressure}{ahead}the solver `implicit`, {advice}")

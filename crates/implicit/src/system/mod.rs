@@ -142,7 +142,8 @@ impl System {
     ) -> Result<Self, SolveError> {
         if device.is_some() && !solver.suits_devices() {
             return Err(SolveError::Impossible(
-                "a GPU solves equations by conjugate gradients with blocks or aggregates; take these, or the CPU",
+                "a GPU solves equations only by conjugate gradients with blocks or aggregates; use one of \
+                 the two, or the CPU",
             ));
         }
         let mut system = Self::forces_only(Arc::clone(&model));

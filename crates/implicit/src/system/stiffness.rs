@@ -211,7 +211,7 @@ impl Stiffness {
 pub(super) fn linear_error(error: LinearError) -> SolveError {
     match error {
         LinearError::TooLarge => SolveError::Impossible(
-            "the equations are too many for the direct solver; use conjugate gradients",
+            "there are too many equations for the direct solver; use conjugate gradients",
         ),
         LinearError::OutOfMemory(needed) => SolveError::OutOfMemory(needed),
         LinearError::Device(error) => SolveError::Device(error),

@@ -416,7 +416,7 @@ fn a_flattened_cube_ends_with_the_corner_that_turns_inside_out() {
         let scene = squeezed(element, run, "by = [0, 0, -0.099]\ncurve = \"hold\"");
         let output = Workshop::new(&scene).run(&[]);
         assert_eq!(output.status(), "failed", "{element}: {}", output.err);
-        let advice = output.err.contains("inverted") && output.err.contains("let it grow over time");
+        let advice = output.err.contains("inverted") && output.words().contains("let them grow over time");
         assert!(advice && !output.err.contains("more load steps"), "{element}: {}", output.err);
     }
 }

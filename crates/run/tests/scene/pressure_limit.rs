@@ -152,8 +152,8 @@ fn a_balloon_that_snaps_at_its_limit_ends_the_run_with_pressure_and_volume() {
     let words = [
         "in `balloon`",
         "neither the volume of `air` nor its `pressure-limit` of 1.1000e4 Pa can be kept",
-        "the volume takes 1.1",
-        "m³ beyond its curve: the surface snaps",
+        "the volume needs 1.1",
+        "m³ beyond its curve. The surface snaps through",
         "try the solver `implicit`",
     ];
     for word in words {

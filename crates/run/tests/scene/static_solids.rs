@@ -208,7 +208,10 @@ fn bodies_that_the_solver_cannot_take_are_refused_by_name() {
     for (text, pieces) in [
         (
             block(newton, "tet4-anp", &relaxing, ""),
-            ["solver `static` is not for this body", "averages the pressure, and that relaxes"],
+            [
+                "solver `static` is not for this body",
+                "averages the pressure, but the volumetric part of its law relaxes",
+            ],
         ),
         (block(newton, "tet4-ianp", &plain, ""), ["`tet4-ianp` couples", "take `tet4-anp`"]),
         (

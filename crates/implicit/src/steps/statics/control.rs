@@ -130,7 +130,8 @@ impl Statics {
         };
         if !factor.is_finite() {
             return Err(fatal(SolveError::Impossible(
-                "the controlled loads do not move what is controlled; control a node that they move and that is not held",
+                "the controlled loads do not change the controlled quantity; control a free node that the \
+                 loads move",
             )));
         }
         for (solution, response) in self.solution.iter_mut().zip(&self.response) {

@@ -376,7 +376,8 @@ impl Statics {
     ) -> Result<Step, Attempt> {
         if control.is_some() {
             let error = SolveError::Impossible(
-                "a controlled load goes with no contact; prescribe the load, or leave the contact out",
+                "a controlled load cannot be combined with contact; prescribe the load, or leave the contact \
+                 out",
             );
             return Err(Attempt { error, retry: false });
         }

@@ -84,7 +84,7 @@ pub(super) fn layers_that_say_too_little_or_too_much_are_refused() {
                 "fibre = [1, 0, 0]\nlayers = [{{ thickness = 1e-3, {} }}]",
                 orthotropic.replace("0.3", "1.5")
             ),
-            ["Poisson's ratio of layer 0 of `wall` is 1.5", "its square below E₁/E₂"],
+            ["Poisson's ratio of layer 0 of `wall` is 1.5", "below √(E₁/E₂) in size"],
         ),
         (
             format!("{THICK}\nlayers = [{{ thickness = 1e-3 }}]"),

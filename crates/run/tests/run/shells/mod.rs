@@ -153,7 +153,7 @@ fn meshes_that_are_no_shells_are_refused_or_repaired() {
     let moebius: [&[u32]; 6] = [&[0, 2, 1], &[1, 2, 3], &[2, 4, 3], &[3, 4, 5], &[4, 1, 5], &[5, 1, 0]];
     let output = from_file(&points, &moebius, &[]);
     assert_eq!(output.status(), "invalid");
-    says(&output, &["shell `wall` has no two sides", "nodes 3 and 4; cut it there"]);
+    says(&output, &["shell `wall` has only one side", "nodes 3 and 4; cut it there"]);
 }
 
 #[test]
@@ -403,7 +403,7 @@ fn a_run_without_equilibrium_keeps_what_it_found() {
     assert_eq!(output.status(), "failed");
     says(
         &output,
-        &["conjugate gradients stand at a residual of", "after 2 iterations", "use the direct solver"],
+        &["conjugate gradients stopped at a residual of", "after 2 iterations", "use the direct solver"],
     );
 }
 
