@@ -261,7 +261,7 @@ fn tets_come_in_several_sizes_and_within_a_distance() {
         assert!(output.code != 0 && output.err.contains(message), "{}", output.err);
     }
     let output = mesh(&workshop, &["--label", "5", "--edge", "4mm", "--protect", "8", "-o", "x.vtu"]);
-    assert!(output.code != 0 && output.err.contains("label 8 can't be protected"), "{}", output.err);
+    assert!(output.code != 0 && output.err.contains("the mesh has no label 8 to protect"), "{}", output.err);
 }
 
 #[test]
