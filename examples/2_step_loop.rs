@@ -10,7 +10,7 @@ use pliant_mechanics::Model;
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
 use pliant_mechanics::model::{Cells, Material, Motion, Solid};
-use pliant_sim::{Part, Simulation};
+use pliant_sim::{ParticipantSetup, Simulation};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let cube = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]];
@@ -27,7 +27,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let pull = Curve { shape: Shape::SmoothStep, from: 0.0, to: 0.5 };
     model.constrain("top", vec![4, 5, 6, 7], Motion::Displacement([0.0, 0.0, 0.001], pull));
 
-    let mut simulation = Simulation::new(Part::explicit("cube", model, 1.0)?)?;
+    let mut simulation = Simulation::new(ParticipantSetup::explicit("cube", model, 1.0)?)?;
     let mut next = 0.0;
     while simulation.time() < 1.0 {
         if simulation.time() >= next {

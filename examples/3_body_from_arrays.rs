@@ -11,7 +11,7 @@ use pliant_mechanics::Model;
 use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
 use pliant_mechanics::load::Load;
 use pliant_mechanics::model::{Averaging, Cells, Material, Solid};
-use pliant_sim::{Part, Simulation};
+use pliant_sim::{ParticipantSetup, Simulation};
 
 /// Edge of a cube [m].
 const EDGE: f64 = 0.02;
@@ -35,7 +35,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     model.fix("ground", vec![0, 1, 2, 3]);
     model.loads.push(Load::gravity(column, [0.0, 0.0, -9.81]));
 
-    let mut simulation = Simulation::new(Part::quasi_static("column", model, 1.0, 1))?;
+    let mut simulation = Simulation::new(ParticipantSetup::quasi_static("column", model, 1.0, 1))?;
     let displacements = simulation.frame()?.displacements("column").ok_or("no column")?;
     let sag = displacements[20..].iter().map(|u| u[2]).sum::<f64>() / 4.0;
     println!("the top sinks by {:.4} mm", -1e3 * sag);

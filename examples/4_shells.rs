@@ -12,7 +12,7 @@ use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_shells::element::Elasticity;
 use pliant_shells::element::Wall;
-use pliant_sim::{Part, Simulation};
+use pliant_sim::{ParticipantSetup, Simulation};
 
 fn main() -> Result<(), Box<dyn Error>> {
     // 1 m × 0.1 m × 10 mm in ten squares of two triangles.
@@ -28,7 +28,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let ramp = Curve { shape: Shape::Ramp, from: 0.0, to: 1.0 };
     model.model_mut().loads.push(Load::new("lift", lift, ramp));
 
-    let mut simulation = Simulation::new(Part::equilibria("strip", model, 1.0, 1))?;
+    let mut simulation = Simulation::new(ParticipantSetup::equilibria("strip", model, 1.0, 1))?;
     simulation.step(1)?;
     let up = simulation.frame()?.displacements("strip").ok_or("no strip")?[20][2];
     // F L³/3EI of a beam.

@@ -12,7 +12,7 @@ use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::law::{AnyLaw, Deformation, OwnLaw, SmallStrainModuli, Split};
 use pliant_mechanics::model::{Cells, Material, Motion, Solid};
 use pliant_mechanics::tensor::{Symmetric, Vector};
-use pliant_sim::{Part, Simulation};
+use pliant_sim::{ParticipantSetup, Simulation};
 
 /// Ψ = μ E:E + ½ λ ln² J, with S = 2 μ E + λ ln J C⁻¹.
 #[derive(Debug)]
@@ -62,7 +62,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let pull = Curve { shape: Shape::Ramp, from: 0.0, to: 1.0 };
     model.constrain("top", vec![4, 5, 6, 7], Motion::Displacement([0.0, 0.0, 0.03], pull));
 
-    let mut simulation = Simulation::new(Part::quasi_static("cube", model, 1.0, 3))?;
+    let mut simulation = Simulation::new(ParticipantSetup::quasi_static("cube", model, 1.0, 3))?;
     let mut worst = 0.0_f64;
     simulation.run(1.0, |now| {
         // Both faces are held: P₃₃ = F₃₃ S₃₃ at the stretch of the cube, times the area.

@@ -123,7 +123,7 @@ pub fn seeds(door: &str) -> Result<Vec<Vec<u8>>, Box<dyn Error>> {
             let mut simulation = block().simulation()?;
             simulation.run(0.1, |_| ())?;
             let state = simulation.state()?;
-            vec![body(&snapshot_to_bytes(simulation.world(), &state)?, SNAPSHOT_HEAD)]
+            vec![body(&snapshot_to_bytes(simulation.setup(), &state)?, SNAPSHOT_HEAD)]
         }
         "image" => files("imaging/tests/corpus", "bin")?,
         "mesh" | "surface" => files("geometry/tests/data", "")?,
@@ -164,7 +164,7 @@ fn checkpoint(bytes: &[u8]) {
 }
 
 fn snapshot(bytes: &[u8]) {
-    static WORLD: OnceLock<Arc<pliant_sim::World>> = OnceLock::new();
+    static WORLD: OnceLock<Arc<pliant_sim::Setup>> = OnceLock::new();
     let world = WORLD.get_or_init(|| Arc::new(block().simulated()));
     for bytes in [bytes, &snapshot_framed(world, bytes)] {
         let Ok(state) = snapshot_from_bytes(world, bytes) else { continue };

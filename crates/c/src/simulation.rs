@@ -305,7 +305,7 @@ pub unsafe extern "C" fn pliant_name(
 
 /// The names of all things of a kind.
 pub(crate) fn names(own: &Running, kind: u32) -> Result<Vec<String>, Fault> {
-    let parts = || own.simulation.world().parts.iter();
+    let parts = || own.simulation.setup().parts.iter();
     let models = || parts().map(|part| &part.model);
     let contacts = || parts().filter_map(|part| part.method.contacts());
     let names: Vec<&str> = match kind {

@@ -34,8 +34,8 @@ pub unsafe extern "C" fn pliant_snapshot_take(
     unsafe {
         running(context, simulation, error, |own| {
             needed(snapshot, "snapshot")?;
-            let (world, state) = (Arc::clone(own.simulation.world()), own.simulation.state()?);
-            let item = Item::Snapshot(Arc::new(OpenSnapshot { world, state }));
+            let (setup, state) = (Arc::clone(own.simulation.setup()), own.simulation.state()?);
+            let item = Item::Snapshot(Arc::new(OpenSnapshot { setup, state }));
             give(snapshot, "snapshot", known(context)?.open(item))
         })
     }
@@ -54,10 +54,10 @@ pub unsafe extern "C" fn pliant_snapshot_restore(
     unsafe {
         running(context, simulation, error, |own| {
             let snapshot = known(context)?.snapshot(snapshot)?;
-            if !Arc::ptr_eq(&snapshot.world, own.simulation.world()) {
+            if !Arc::ptr_eq(&snapshot.setup, own.simulation.setup()) {
                 // Of another simulation, it has to be one of this model.
-                let bytes = snapshot_to_bytes(&snapshot.world, &snapshot.state)?;
-                snapshot_from_bytes(own.simulation.world(), &bytes)
+                let bytes = snapshot_to_bytes(&snapshot.setup, &snapshot.state)?;
+                snapshot_from_bytes(own.simulation.setup(), &bytes)
                     .map_err(|failure| Fault::new(PliantStatus::BadSnapshot, failure.message))?;
             }
             own.compute(|now| now.simulation.restore(snapshot.state.clone()))?;
@@ -81,7 +81,7 @@ pub unsafe extern "C" fn pliant_snapshot_bytes(
     unsafe {
         call(context, snapshot, error, |context| {
             let snapshot = context.snapshot(snapshot)?;
-            let bytes = snapshot_to_bytes(&snapshot.world, &snapshot.state)?;
+            let bytes = snapshot_to_bytes(&snapshot.setup, &snapshot.state)?;
             give_bytes(&bytes, buffer, capacity, length, false)
         })
     }
@@ -102,10 +102,10 @@ pub unsafe extern "C" fn pliant_snapshot_read(
     unsafe {
         running(context, simulation, error, |own| {
             needed(snapshot, "snapshot")?;
-            let world = Arc::clone(own.simulation.world());
-            let state = snapshot_from_bytes(&world, array(bytes, count, "bytes")?)
+            let setup = Arc::clone(own.simulation.setup());
+            let state = snapshot_from_bytes(&setup, array(bytes, count, "bytes")?)
                 .map_err(|failure| Fault::new(PliantStatus::BadSnapshot, failure.message))?;
-            let item = Item::Snapshot(Arc::new(OpenSnapshot { world, state }));
+            let item = Item::Snapshot(Arc::new(OpenSnapshot { setup, state }));
             give(snapshot, "snapshot", known(context)?.open(item))
         })
     }

@@ -39,7 +39,7 @@ pub(crate) fn unknown(own: &Running, kind: u32, what: &str, name: &str) -> Fault
 /// The nodes of a body by name; null is all bodies.
 fn nodes(own: &Running, body: Option<&str>) -> Result<PliantNodes, Fault> {
     let Some(name) = body else { return Ok(PliantNodes { first: 0, count: own.nodes() as u64 }) };
-    let parts = own.simulation.world().parts.iter().enumerate();
+    let parts = own.simulation.setup().parts.iter().enumerate();
     let found = parts.flat_map(|(part, own)| own.model.bodies.iter().map(move |body| (part, body)));
     let mut found = found.filter(|(_, body)| body.name == name);
     match found.next() {
@@ -105,7 +105,7 @@ pub unsafe extern "C" fn pliant_nodes(
             }
             let simulation = &own.simulation;
             let mut node = 0;
-            for (part, now) in simulation.world().parts.iter().zip(simulation.instants()) {
+            for (part, now) in simulation.setup().parts.iter().zip(simulation.instants()) {
                 for (local, rest) in part.model.rest.iter().enumerate() {
                     if (first..first + count).contains(&node) {
                         let moved = || now.displacement(local);

@@ -22,7 +22,7 @@ use pliant_haptics::thread::{Haptics as Thread, Report};
 use pliant_haptics::trace::Trace;
 use pliant_scene::World;
 use pliant_sim::contact::touch::{With, lattice};
-use pliant_sim::{Frame, Simulation, State, StopFlag};
+use pliant_sim::{Frame, Simulation, SimulationState, StopFlag};
 
 use crate::SUCCESS;
 use crate::arguments::Haptics;
@@ -295,9 +295,9 @@ fn on_the_way(now: &Isometry3<f64>, goal: &Isometry3<f64>, time: f64) -> Isometr
 
 /// States to go back to.
 struct Snapshots {
-    start: State,
+    start: SimulationState,
     /// Times [s] and states, the newest last.
-    states: VecDeque<(f64, State)>,
+    states: VecDeque<(f64, SimulationState)>,
     /// Failures so far, and successive failures that went back to the start.
     failures: usize,
     in_a_row: usize,

@@ -136,12 +136,12 @@ impl<R: LaneNumber> Relaxation<R> {
 
 #[cfg(test)]
 mod tests {
-    use pliant_mechanics::prony::{Part, PronyTerm};
+    use pliant_mechanics::prony::{PronyPart, PronyTerm};
 
     use super::*;
 
     fn series(update: PronyUpdate) -> Prony {
-        let term = PronyTerm { part: Part::Isochoric, weight: 0.5, time: 0.58 };
+        let term = PronyTerm { part: PronyPart::Isochoric, weight: 0.5, time: 0.58 };
         Prony::new(&[term], update).unwrap()
     }
 

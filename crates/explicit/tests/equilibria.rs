@@ -10,7 +10,7 @@ use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::law::AnyLaw;
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::model::{Averaging, Body, Cells, Constraint, Material, Model, Motion, Solid};
-use pliant_mechanics::prony::{Part, Prony, PronyTerm, PronyUpdate};
+use pliant_mechanics::prony::{Prony, PronyPart, PronyTerm, PronyUpdate};
 use serde_json::json;
 
 fn claim(what: &str, found: f64, limit: f64) {
@@ -152,7 +152,7 @@ fn a_motion_held_from_the_start_does_the_work_of_one_that_grows() {
 
 fn relaxing() -> Prony {
     let term = |part| PronyTerm { part, weight: 0.5, time: 1.0 };
-    Prony::new(&[Part::Isochoric, Part::Volumetric].map(term), PronyUpdate::Exact).unwrap()
+    Prony::new(&[PronyPart::Isochoric, PronyPart::Volumetric].map(term), PronyUpdate::Exact).unwrap()
 }
 
 /// Both parts relax alike, so that the held cube keeps its shape and all forces fall to 1 − ½ (1 −
@@ -196,7 +196,8 @@ fn what_relaxing_laws_store_and_dissipate_hardly_depends_on_the_load_steps() {
 fn an_explicit_run_begins_with_the_instantaneous_law() {
     fn begins<R: Scalar>(element: &str) {
         let term = |part| PronyTerm { part, weight: 0.5, time: 1e-7 };
-        let prony = Prony::new(&[Part::Isochoric, Part::Volumetric].map(term), PronyUpdate::Exact).unwrap();
+        let prony =
+            Prony::new(&[PronyPart::Isochoric, PronyPart::Volumetric].map(term), PronyUpdate::Exact).unwrap();
         let stress = |prony: Prony| {
             let cube = squeezed(0.45, prony, element, hold());
             let mut state = State::<R>::at_rest(&cube);

@@ -15,7 +15,7 @@ use std::time::Instant as Clock;
 
 use bytemuck::{Pod, Zeroable};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
-use pliant_implicit::{Assembly, CurvedSurface, State};
+use pliant_implicit::{Assembly, AssemblyState, CurvedSurface};
 use pliant_mechanics::load::{LoadKind, Spread};
 use pliant_mechanics::model::Motion;
 use pliant_shells::{EdgeRule, Patch};
@@ -171,7 +171,7 @@ impl GpuShells {
     }
 
     /// Uploads another state than the present one.
-    pub fn upload(&mut self, state: &State) {
+    pub fn upload(&mut self, state: &AssemblyState) {
         let four = |v: &Vector3<f64>| [v.x as f32, v.y as f32, v.z as f32, 0.0];
         let places: Vec<[Four; 2]> = (state.position.iter().zip(&state.rotation).enumerate())
             .map(|(node, (place, rotation))| {
@@ -206,7 +206,7 @@ impl GpuShells {
     ///
     /// # Errors
     /// If the device fails.
-    pub fn advance(&mut self, state: &mut State, steps: u64) -> Result<ShellsMoved, GpuError> {
+    pub fn advance(&mut self, state: &mut AssemblyState, steps: u64) -> Result<ShellsMoved, GpuError> {
         if !self.loaded {
             self.upload(state);
         }
@@ -264,7 +264,7 @@ impl GpuShells {
 
     /// Reads the state back: the first instant at which a facet was broken, and the work of forces from
     /// outside [J].
-    fn read(&mut self, state: &mut State) -> Result<(u32, f64), GpuError> {
+    fn read(&mut self, state: &mut AssemblyState) -> Result<(u32, f64), GpuError> {
         let model = &self.model;
         let bytes = (32 * model.rest.len()) as u64;
         let mut read = (NONE, 0.0);
@@ -528,7 +528,7 @@ impl Pressed {
 /// Returns the normal of each corner at rest in the axes of its facet. The first normal also has the control
 /// points on straight edges, as bits.
 fn normals(model: &Assembly) -> Vec<[Four; 3]> {
-    let (surface, rest) = (CurvedSurface::new(model, EdgeRule::Arc), State::at_rest(model));
+    let (surface, rest) = (CurvedSurface::new(model, EdgeRule::Arc), AssemblyState::at_rest(model));
     let of_facet = |(number, facet): (u32, &pliant_shells::Facet)| {
         let patch = surface.patch(model, &rest, number);
         let axes: Matrix3<f64> = facet.at_rest().axes;

@@ -45,7 +45,7 @@ impl Spread {
     }
 
     /// Returns the time [s] that a part of the times does not exceed, to a microsecond; `None` without any.
-    pub(crate) fn quantile(&self, part: f64) -> Option<f64> {
+    pub fn quantile(&self, part: f64) -> Option<f64> {
         let rank = (part * self.count as f64).ceil().max(1.0) as u64;
         let mut below = 0;
         let bin = self.bins.iter().position(|&count| {

@@ -5,13 +5,13 @@
 //! A shell element is the discrete Kirchhoff triangle (Batoz, Bathe, Ho 1980) with the ANDES membrane
 //! (Felippa 2003). The membrane takes the mean strain of the curved triangle. The element has six degrees of
 //! freedom a node, in a frame that turns with the facet. Its force is the gradient of its energy. An
-//! [`Assembly`] is constant: a model with shells. A [`State`] changes. [`Statics`] finds equilibria;
+//! [`Assembly`] is constant: a model with shells. A [`AssemblyState`] changes. [`Statics`] finds equilibria;
 //! [`BackwardEuler`] and [`ExplicitShells`] move a state in time. [`CurvedSurface`] is the smooth surface of
 //! the shells for pictures and for forces on any of its points.
 //!
 //! ```
 //! use nalgebra::Vector3;
-//! use pliant_implicit::{Assembly, Shell, State, StaticSettings, Statics};
+//! use pliant_implicit::{Assembly, Shell, AssemblyState, StaticSettings, Statics};
 //! use pliant_mechanics::curve::{Curve, Shape};
 //! use pliant_mechanics::load::{Load, LoadKind};
 //! use pliant_shells::element::{Elasticity, Wall};
@@ -28,7 +28,7 @@
 //! let curve = Curve { shape: Shape::Ramp, from: 0.0, to: 1.0 };
 //! model.model_mut().loads.push(Load::new("lift", kind, curve));
 //!
-//! let mut state = State::at_rest(&model);
+//! let mut state = AssemblyState::at_rest(&model);
 //! let step = Statics::new(model.clone(), StaticSettings::default())?.solve(&mut state, 1.0)?;
 //! assert!(step.residuals.len() < 20 && step.negative_pivots == 0);
 //! assert!(state.displacement(&model, 21).z > 0.5);
@@ -51,7 +51,7 @@ pub use model::assembly::{Assembly, Notes, Shell, Spring};
 pub use model::contact::ContactModel;
 pub use model::error::{ModelError, SolveError};
 pub use model::resolution::Resolution;
-pub use model::state::State;
+pub use model::state::AssemblyState;
 pub use model::turns::CarriedTurn;
 pub use solid::relaxation::History;
 pub use steps::backward_euler::{BackwardEuler, DynamicSettings, DynamicStep, Integrator};

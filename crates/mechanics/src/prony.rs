@@ -16,14 +16,15 @@ use crate::tensor::Symmetric;
 /// Part of the stress that relaxes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Part {
+#[schemars(rename = "Part")]
+pub enum PronyPart {
     /// The change of shape (for an unsplit law: the term with the shear modulus).
     Isochoric,
     /// The change of volume.
     Volumetric,
 }
 
-impl std::fmt::Display for Part {
+impl std::fmt::Display for PronyPart {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Self::Isochoric => "isochoric",
@@ -37,7 +38,7 @@ impl std::fmt::Display for Part {
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct PronyTerm {
     /// The part of the stress that relaxes.
-    pub part: Part,
+    pub part: PronyPart,
     /// Fraction a of the instantaneous stress that relaxes; the weights of one part sum to less than 1.
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub weight: f64,
@@ -106,7 +107,7 @@ pub enum PronyError {
     )]
     Sum {
         /// The part.
-        part: Part,
+        part: PronyPart,
         /// Sum of its weights.
         sum: f64,
     },
@@ -121,11 +122,13 @@ impl Prony {
                 return Err(PronyError::Term { index, weight, time });
             }
             match part {
-                Part::Isochoric => prony.isochoric.push((weight, time)),
-                Part::Volumetric => prony.volumetric.push((weight, time)),
+                PronyPart::Isochoric => prony.isochoric.push((weight, time)),
+                PronyPart::Volumetric => prony.volumetric.push((weight, time)),
             }
         }
-        for (part, series) in [(Part::Isochoric, &prony.isochoric), (Part::Volumetric, &prony.volumetric)] {
+        for (part, series) in
+            [(PronyPart::Isochoric, &prony.isochoric), (PronyPart::Volumetric, &prony.volumetric)]
+        {
             let sum: f64 = series.iter().map(|(weight, _)| weight).sum();
             if sum >= 1.0 {
                 return Err(PronyError::Sum { part, sum });
@@ -191,7 +194,7 @@ mod tests {
 
     #[test]
     fn weights_that_leave_nothing_are_refused() {
-        let term = |weight| PronyTerm { part: Part::Volumetric, weight, time: 1.0 };
+        let term = |weight| PronyTerm { part: PronyPart::Volumetric, weight, time: 1.0 };
         assert!(matches!(
             Prony::new(&[term(0.5), term(0.5)], PronyUpdate::Exact),
             Err(PronyError::Sum { .. })

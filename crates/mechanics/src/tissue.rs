@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use crate::law::{AnyLaw, Deformation};
 use crate::model::Material;
-use crate::prony::{Part, Prony, PronyTerm, PronyUpdate};
+use crate::prony::{Prony, PronyPart, PronyTerm, PronyUpdate};
 use crate::tensor::Tensor;
 
 /// A law by its name and parameters in a scene file.
@@ -40,7 +40,7 @@ pub fn liver() -> AnyLaw {
 
 /// Relaxation of the liver: half of the isochoric stress, τ = 0.58 s.
 pub fn liver_relaxation(update: PronyUpdate) -> Prony {
-    let term = PronyTerm { part: Part::Isochoric, weight: 0.5, time: 0.58 };
+    let term = PronyTerm { part: PronyPart::Isochoric, weight: 0.5, time: 0.58 };
     Prony::new(&[term], update).unwrap_or_else(|error| panic!("{error}"))
 }
 

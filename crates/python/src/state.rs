@@ -21,8 +21,8 @@ pub struct State {
 
 #[derive(Clone)]
 enum Snapshot {
-    Whole(Arc<pliant_sim::State>),
-    /// Bytes from a file or another process, of no world yet.
+    Whole(Arc<pliant_sim::SimulationState>),
+    /// Bytes from a file or another process, of no setup yet.
     Bytes(Arc<Vec<Vec<u8>>>),
 }
 
@@ -34,15 +34,15 @@ impl State {
         Ok(Self { snapshot, time: simulation.time(), steps: simulation.steps(), displacement })
     }
 
-    /// Returns the state for the world of a run.
-    pub fn taken(&self, running: &Running) -> Result<pliant_sim::State, Trouble> {
-        let world = running.simulation().world();
+    /// Returns the state for the setup of a run.
+    pub fn taken(&self, running: &Running) -> Result<pliant_sim::SimulationState, Trouble> {
+        let setup = running.simulation().setup();
         let other =
             || Trouble::Value("the state is of a model with other meshes, solvers or precision".into());
         match &self.snapshot {
-            // Another world refuses it when it is taken up.
+            // Another setup refuses it when it is taken up.
             Snapshot::Whole(state) => Ok((**state).clone()),
-            Snapshot::Bytes(bytes) => pliant_sim::State::decode(world, bytes).ok_or_else(other),
+            Snapshot::Bytes(bytes) => pliant_sim::SimulationState::decode(setup, bytes).ok_or_else(other),
         }
     }
 }

@@ -7,7 +7,7 @@ use pliant_sim::contact::touch::{Contact, With};
 use pliant_sim::{Failure, FailureKind, Instant, Precision};
 
 use pliant_format::tables::SolverName;
-use pliant_scene::{Built, Part};
+use pliant_scene::{Built, PlannedParticipant};
 
 /// Damping [1/s] times step [s] above which a step does not resolve the damping. Over a step central
 /// differences multiply a velocity by (1 − a) / (1 + a), where a = ½ damping × step. From 2 on the velocity
@@ -15,8 +15,8 @@ use pliant_scene::{Built, Part};
 const RESOLVED: f64 = 1.0;
 
 /// The remedy of a failed explicit step, where the run's state says more than the failure itself.
-pub(crate) fn remedy(failure: &Failure, part: &Part, now: &dyn Instant) -> Option<String> {
-    let Part { scene, built, plan, .. } = part;
+pub(crate) fn remedy(failure: &Failure, part: &PlannedParticipant, now: &dyn Instant) -> Option<String> {
+    let PlannedParticipant { scene, built, plan, .. } = part;
     if scene.run.solver != SolverName::Explicit || built.implicit.is_some() {
         return None;
     }
@@ -64,7 +64,7 @@ pub(crate) fn remedy(failure: &Failure, part: &Part, now: &dyn Instant) -> Optio
 
 /// Advice to limit the force of moving tools that touch these bodies and have no limit; empty without such
 /// tools.
-fn pushing(part: &Part, now: &dyn Instant) -> String {
+fn pushing(part: &PlannedParticipant, now: &dyn Instant) -> String {
     let Some(all) = &part.built.contacts else { return String::new() };
     let unlimited = |contact: &Contact| {
         let With::Rigid(number) = contact.with else { return None };

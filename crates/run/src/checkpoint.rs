@@ -14,8 +14,8 @@ use pliant_format::tables::{LoadSteps, SolverName};
 use pliant_geometry::io::read_limited;
 use pliant_geometry::words::{counted, number};
 use pliant_mechanics::fingerprint;
-use pliant_scene::{Part, World};
-use pliant_sim::{Precision, Schedule, State};
+use pliant_scene::{PlannedParticipant, World};
+use pliant_sim::{Precision, Schedule, SimulationState};
 use serde::{Deserialize, Serialize};
 
 use crate::output::{OutputError, OutputFolder, replace};
@@ -235,7 +235,7 @@ fn differing(parts: &[String]) -> String {
 }
 
 impl OwnOrigin {
-    fn of(Part { name, scene, built, plan }: &Part) -> Self {
+    fn of(PlannedParticipant { name, scene, built, plan }: &PlannedParticipant) -> Self {
         let mut parts = built.model.fingerprints();
         parts.extend(built.implicit.iter().flat_map(|part| part.fingerprints()));
         parts.push(("`run.tolerance`".into(), fingerprint(&scene.run.tolerance)));
@@ -440,12 +440,12 @@ impl Checkpoint {
     }
 
     /// The state of a world, which is given with and without its tables; `None` where it has other sizes.
-    pub(crate) fn state(&self, world: &World, simulated: &pliant_sim::World) -> Option<State> {
+    pub(crate) fn state(&self, world: &World, simulated: &pliant_sim::Setup) -> Option<SimulationState> {
         self.state_at(&self.progressed, &self.participants, world, simulated)
     }
 
     /// The rollback points of a world; `None` where one has other sizes.
-    pub(crate) fn points(&self, world: &World, simulated: &pliant_sim::World) -> Option<Vec<Point>> {
+    pub(crate) fn points(&self, world: &World, simulated: &pliant_sim::Setup) -> Option<Vec<Point>> {
         let point = |(progressed, participants): &EncodedPoint| {
             let state = self.state_at(progressed, participants, world, simulated)?;
             Some(Point { progressed: progressed.clone(), state })
@@ -458,8 +458,8 @@ impl Checkpoint {
         progressed: &Progressed,
         participants: &[Vec<u8>],
         world: &World,
-        simulated: &pliant_sim::World,
-    ) -> Option<State> {
+        simulated: &pliant_sim::Setup,
+    ) -> Option<SimulationState> {
         let parts = &world.participants;
         let constraints: usize = parts.iter().map(|part| part.built.model.constraints.len()).sum();
         let history = &progressed.history;
@@ -473,7 +473,7 @@ impl Checkpoint {
         if !whole {
             return None;
         }
-        State::decode(simulated, participants).filter(|state| state.time() == progressed.time)
+        SimulationState::decode(simulated, participants).filter(|state| state.time() == progressed.time)
     }
 }
 
@@ -515,7 +515,7 @@ impl<'a> Checkpoints<'a> {
     pub fn write(
         &self,
         progressed: &Progressed,
-        state: &State,
+        state: &SimulationState,
         points: &[Point],
     ) -> Result<PathBuf, OutputError> {
         let path = self.folder.path().join(name(progressed.steps));
@@ -535,7 +535,7 @@ impl<'a> Checkpoints<'a> {
 fn encode(
     origin: &Origin,
     progressed: &Progressed,
-    state: &State,
+    state: &SimulationState,
     points: &[Point],
 ) -> postcard::Result<Vec<u8>> {
     let point = |Point { progressed, state }: &Point| Ok((progressed.clone(), state.encode()?));
@@ -641,7 +641,7 @@ mod tests {
         }
     }
 
-    /// The layout of [`State`] and [`Progressed`] decides which checkpoints can be read. Whoever changes it
+    /// The layout of [`SimulationState`] and [`Progressed`] decides which checkpoints can be read. Whoever changes it
     /// gives [`FORMAT`] the next number, and this test the new bytes.
     #[test]
     fn the_layout_of_format_20_is_as_it_was() {

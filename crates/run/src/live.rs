@@ -10,7 +10,7 @@ use pliant_geometry::{Mesh, Vector3};
 use pliant_sim::contact::touch::Rigid;
 #[cfg(feature = "gpu")]
 use pliant_sim::gpu::{DeviceMapping, DevicePoints, PointValue};
-use pliant_sim::{Failure, Simulation, State};
+use pliant_sim::{Failure, Simulation, SimulationState};
 
 use crate::output::{Column, FieldMesh, Frame, Samples, frames};
 use pliant_format::tables::VtuTable;
@@ -56,7 +56,11 @@ impl Live {
     ///
     /// # Errors
     /// If a stepper can't be made.
-    pub fn go_on(world: &Arc<World>, state: State, before: &World) -> Result<Option<Self>, Failure> {
+    pub fn go_on(
+        world: &Arc<World>,
+        state: SimulationState,
+        before: &World,
+    ) -> Result<Option<Self>, Failure> {
         let simulation = Simulation::continued(world.simulated(), state, &before.simulated())?;
         Ok(simulation.map(|simulation| Self::of(world, simulation)))
     }
@@ -65,7 +69,7 @@ impl Live {
     ///
     /// # Errors
     /// If a stepper can't be made. The run then stays as it was.
-    pub fn restore(&mut self, state: State) -> Result<(), Failure> {
+    pub fn restore(&mut self, state: SimulationState) -> Result<(), Failure> {
         self.simulation.restore(state)?;
         #[cfg(feature = "gpu")]
         {
@@ -80,7 +84,7 @@ impl Live {
     /// If the steps can't be halved, the state can't be taken, or a stepper can't be made.
     pub fn halve_steps(&mut self) -> Result<(), Failure> {
         let mut state = self.simulation.state()?;
-        if !state.halve_steps(self.simulation.world()) {
+        if !state.halve_steps(self.simulation.setup()) {
             return Err(Failure::input(&"the steps of this scene cannot be halved"));
         }
         self.restore(state)

@@ -5,7 +5,7 @@
 //! instability has grown for a while before it is noticed. The points are part of checkpoints, so a resumed
 //! run goes back to the same states.
 
-use pliant_sim::{Failure, Simulation, State, World};
+use pliant_sim::{Failure, Setup, Simulation, SimulationState};
 
 use crate::progressed::Progressed;
 
@@ -20,7 +20,7 @@ const BALANCED: f64 = 0.01;
 #[derive(Clone, Debug)]
 pub(crate) struct Point {
     pub progressed: Progressed,
-    pub state: State,
+    pub state: SimulationState,
 }
 
 /// The points of a run, the earliest first.
@@ -33,7 +33,7 @@ pub(crate) struct RollbackPoints {
 impl RollbackPoints {
     /// Makes the rollback points of a world, with the points of the run that it resumes; `None` if no
     /// participant cuts its steps.
-    pub fn new(world: &World, points: Vec<Point>) -> Option<Self> {
+    pub fn new(world: &Setup, points: Vec<Point>) -> Option<Self> {
         let most = world.parts.iter().map(|part| part.steps.number).max()?;
         let common = world.parts.iter().map(|part| part.steps.number).min()?;
         let every = (EVERY * common.max(1) / most.max(1)).max(1);
@@ -61,7 +61,7 @@ impl RollbackPoints {
 
     /// The point to go back to after a failure, with halved steps; `None` where shorter steps do not help, or
     /// were halved often enough.
-    pub fn take(&mut self, world: &World, failure: &Failure) -> Option<Point> {
+    pub fn take(&mut self, world: &Setup, failure: &Failure) -> Option<Point> {
         let point = self.points.first_mut().filter(|_| world.shorter_steps_may_avoid(failure))?;
         if !point.state.halve_steps(world) {
             return None;

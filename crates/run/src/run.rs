@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use pliant_explicit::Wanted;
 use pliant_geometry::Mesh;
-use pliant_scene::{Part, World};
+use pliant_scene::{PlannedParticipant, World};
 use pliant_sim::contact::barrier::IntersectionCheck;
 use pliant_sim::{Failure, FailureKind, LoadStepProgress, Observer, Schedule, Simulation, StopFlag};
 
@@ -162,7 +162,7 @@ fn go(
 }
 
 /// The search for intersections of a participant that asks for one.
-fn check_of(part: &Part) -> Option<IntersectionCheck> {
+fn check_of(part: &PlannedParticipant) -> Option<IntersectionCheck> {
     let contacts = part.built.contacts.as_deref().filter(|_| part.built.check_intersections)?;
     Some(IntersectionCheck::new(contacts, &part.built.model.rest))
 }
@@ -221,7 +221,7 @@ impl<'a, 'env> Run<'a, 'env> {
             folder.go_on(&world.scene)?;
         }
         let outputs = Outputs::new(world, folder.path(), &mut files, written, spare)?;
-        let points = options.resume.and_then(|checkpoint| checkpoint.points(world, simulation.world()));
+        let points = options.resume.and_then(|checkpoint| checkpoint.points(world, simulation.setup()));
         let points = points.unwrap_or_default();
         let fresh = || vec![Watched::default(); world.participants.len()];
         let started = Instant::now();
@@ -233,7 +233,7 @@ impl<'a, 'env> Run<'a, 'env> {
             watched: before.map_or_else(fresh, |before| before.watched.clone()),
             checks: world.participants.iter().map(check_of).collect(),
             checkpoints: Checkpoints::new(world, folder, simulation.time()),
-            rollback: RollbackPoints::new(simulation.world(), points),
+            rollback: RollbackPoints::new(simulation.setup(), points),
             folder,
             spare,
             stop: options.stop,
@@ -297,7 +297,7 @@ impl<'a, 'env> Run<'a, 'env> {
         loop {
             let Err(failure) = simulation.observe(self.world.scene.scene.until, self) else { return Ok(()) };
             let points = self.rollback.as_mut();
-            match points.and_then(|points| points.take(simulation.world(), &failure)) {
+            match points.and_then(|points| points.take(simulation.setup(), &failure)) {
                 Some(point) => self.go_back(simulation, point)?,
                 None => return Err(failure),
             }

@@ -67,7 +67,7 @@ impl Skin {
         match &self.follows {
             Follows::Nodes(nodes) => vec![(simulation.node(self.part, nodes[vertex as usize]), 1.0)],
             Follows::Carrier(number) => {
-                let model = &simulation.world().parts[self.part].model;
+                let model = &simulation.setup().parts[self.part].model;
                 let row = model.surfaces[*number].mapping.row(vertex as usize);
                 row.map(|(node, weight)| (simulation.node(self.part, node), weight)).collect()
             }

@@ -4,7 +4,7 @@
 //! the body (u64). Then come the body and the CRC-32 of all bytes before it (u32). Numbers are little-endian.
 
 use pliant_mechanics::fingerprint;
-use pliant_sim::{Failure, FailureKind, State, World};
+use pliant_sim::{Failure, FailureKind, Setup, SimulationState};
 
 use crate::checkpoint::FORMAT;
 
@@ -18,7 +18,7 @@ const CRC: usize = 4;
 ///
 /// # Errors
 /// If it can't be encoded.
-pub fn snapshot_to_bytes(world: &World, state: &State) -> Result<Vec<u8>, Failure> {
+pub fn snapshot_to_bytes(world: &Setup, state: &SimulationState) -> Result<Vec<u8>, Failure> {
     let failed = |error: postcard::Error| Failure::new(FailureKind::Output, error.to_string(), None);
     let body = state.encode().and_then(|parts| postcard::to_stdvec(&parts)).map_err(failed)?;
     Ok(snapshot_framed(world, &body))
@@ -26,7 +26,7 @@ pub fn snapshot_to_bytes(world: &World, state: &State) -> Result<Vec<u8>, Failur
 
 /// The bytes of a snapshot of a world with this body: magic, format, fingerprint and length before it, the
 /// CRC-32 after it.
-pub fn snapshot_framed(world: &World, body: &[u8]) -> Vec<u8> {
+pub fn snapshot_framed(world: &Setup, body: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(HEAD + body.len() + CRC);
     bytes.extend(MAGIC);
     bytes.extend(FORMAT.to_le_bytes());
@@ -41,7 +41,7 @@ pub fn snapshot_framed(world: &World, body: &[u8]) -> Vec<u8> {
 ///
 /// # Errors
 /// If they are no snapshot, damaged, of another format or of another model.
-pub fn snapshot_from_bytes(world: &World, bytes: &[u8]) -> Result<State, Failure> {
+pub fn snapshot_from_bytes(world: &Setup, bytes: &[u8]) -> Result<SimulationState, Failure> {
     let refused = |reason: &str| Err(Failure::input(&format_args!("the snapshot {reason}")));
     if !bytes.starts_with(&MAGIC) {
         return refused("has no snapshot header: the bytes are something else");
@@ -64,15 +64,15 @@ pub fn snapshot_from_bytes(world: &World, bytes: &[u8]) -> Result<State, Failure
         return refused("is of another model: meshes, laws, constraints or loads differ");
     }
     let parts: Option<Vec<Vec<u8>>> = postcard::from_bytes(&content[HEAD..]).ok();
-    match parts.and_then(|parts| State::decode(world, &parts)) {
+    match parts.and_then(|parts| SimulationState::decode(world, &parts)) {
         Some(state) => Ok(state),
         None => refused("is of another model or solver"),
     }
 }
 
 /// A fingerprint of all models of a world.
-fn model(world: &World) -> u64 {
-    let of = |part: &pliant_sim::Part| {
+fn model(world: &Setup) -> u64 {
+    let of = |part: &pliant_sim::ParticipantSetup| {
         let shells = part.method.bodies().map(|bodies| bodies.fingerprints());
         (part.model.fingerprints(), shells, part.steps.number, part.steps.step.to_bits())
     };

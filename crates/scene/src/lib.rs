@@ -52,4 +52,4 @@ pub use bound::element_bound;
 pub use cache::{MeshCache, cache_folder};
 pub use plan::{LimitingElement, Limits, Plan, plan};
 pub use target::Target;
-pub use world::{Part, World};
+pub use world::{PlannedParticipant, World};

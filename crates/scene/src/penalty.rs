@@ -5,7 +5,7 @@ use pliant_format::tables::{Rotations, SolverName, StepChoice, TieMethod, TieTab
 use pliant_sim::PenaltyTie;
 
 use crate::assemble::{Placed, attach, doubt_points, holds_nothing};
-use crate::world::{Part, World};
+use crate::world::{PlannedParticipant, World};
 
 /// Steps in an automatic one of explicit participants that are tied to others. A body at half of its usual
 /// step leaves ties more of the limit of stability: they are some twenty times stiffer.
@@ -73,7 +73,7 @@ impl World {
 
     /// The participant of a body, and its place there.
     fn tied_body(&self, name: &str) -> Option<(usize, usize)> {
-        let of = |part: &Part| part.built.bodies.iter().position(|body| body.name == name);
+        let of = |part: &PlannedParticipant| part.built.bodies.iter().position(|body| body.name == name);
         self.participants.iter().enumerate().find_map(|(index, part)| Some((index, of(part)?)))
     }
 
@@ -91,7 +91,7 @@ impl World {
 
     /// Makes automatic steps of participants short enough for their ties to others to be stiff.
     pub(crate) fn shorten_tied(&mut self) {
-        let automatic = |part: &Part| matches!(part.scene.run.step, StepChoice::Auto(_));
+        let automatic = |part: &PlannedParticipant| matches!(part.scene.run.step, StepChoice::Auto(_));
         let tied: Vec<[usize; 2]> = self.ties.iter().map(|tie| tie.parts).collect();
         let until = self.scene.scene.until;
         for (index, part) in self.participants.iter_mut().enumerate() {

@@ -21,7 +21,7 @@ pub struct World {
     /// The scene.
     pub scene: Scene,
     /// Bodies that one stepper advances together. One of them where all bodies go together.
-    pub participants: Vec<Part>,
+    pub participants: Vec<PlannedParticipant>,
     /// Ties between them.
     pub ties: Vec<PenaltyTie>,
     /// Nodes of participants that others touch.
@@ -30,7 +30,7 @@ pub struct World {
 
 /// A participant: some bodies of a scene, with their model and how it is stepped.
 #[derive(Clone, Debug)]
-pub struct Part {
+pub struct PlannedParticipant {
     /// Its name; empty where all bodies go together.
     pub name: String,
     /// The tables of the scene that are about it.
@@ -77,7 +77,7 @@ impl World {
                 Ok(pool) => pool.install(|| plan(&part, &built)),
                 Err(_) => plan(&part, &built),
             };
-            Ok(Part { name, plan: plan?, scene: part, built: Arc::new(built) })
+            Ok(PlannedParticipant { name, plan: plan?, scene: part, built: Arc::new(built) })
         };
         let participants = built.into_iter().map(planned).collect::<Result<Vec<_>, SceneErrors>>()?;
         let mut world =
@@ -113,8 +113,12 @@ impl World {
 
     /// Makes the world of a scene with one participant.
     pub fn of(scene: &Scene, built: &Arc<Built>, plan: &Plan) -> Self {
-        let part =
-            Part { name: String::new(), scene: scene.clone(), built: Arc::clone(built), plan: plan.clone() };
+        let part = PlannedParticipant {
+            name: String::new(),
+            scene: scene.clone(),
+            built: Arc::clone(built),
+            plan: plan.clone(),
+        };
         Self {
             scene: scene.clone(),
             participants: vec![part],
@@ -142,7 +146,7 @@ impl World {
     }
 
     /// The participant where all bodies go together.
-    pub fn only(&self) -> Option<&Part> {
+    pub fn only(&self) -> Option<&PlannedParticipant> {
         match &self.participants[..] {
             [part] => Some(part),
             _ => None,
@@ -150,8 +154,8 @@ impl World {
     }
 
     /// The participant that has the least steps, and so the common instants of all.
-    pub fn slowest(&self) -> &Part {
-        let steps = |part: &&Part| part.plan.steps.number;
+    pub fn slowest(&self) -> &PlannedParticipant {
+        let steps = |part: &&PlannedParticipant| part.plan.steps.number;
         // A world has a participant: a scene without bodies is refused when it is read.
         self.participants.iter().min_by_key(steps).unwrap_or(&self.participants[0])
     }
@@ -180,9 +184,9 @@ impl World {
     }
 
     /// Its participants without their tables.
-    pub fn simulated(&self) -> pliant_sim::World {
-        let parts = self.participants.iter().map(Part::simulated).collect();
-        pliant_sim::World { parts, ties: self.ties.clone(), coupled_surfaces: self.coupled_surfaces.clone() }
+    pub fn simulated(&self) -> pliant_sim::Setup {
+        let parts = self.participants.iter().map(PlannedParticipant::simulated).collect();
+        pliant_sim::Setup { parts, ties: self.ties.clone(), coupled_surfaces: self.coupled_surfaces.clone() }
     }
 
     /// Adds a doubt to those that did not keep the models from being built.
@@ -198,7 +202,7 @@ impl World {
     /// Remarks on how the scene was built and is stepped.
     pub fn notes(&self) -> impl Iterator<Item = &String> {
         let of = |part| {
-            let Part { built, plan, .. }: &Part = part;
+            let PlannedParticipant { built, plan, .. }: &PlannedParticipant = part;
             built.notes.iter().chain(&plan.note).chain(&plan.target.note)
         };
         self.participants.iter().flat_map(of)
@@ -232,11 +236,11 @@ impl World {
     }
 }
 
-impl Part {
+impl PlannedParticipant {
     /// Returns the participant without its tables.
-    fn simulated(&self) -> pliant_sim::Part {
+    fn simulated(&self) -> pliant_sim::ParticipantSetup {
         let Self { name, scene, built, plan } = self;
-        pliant_sim::Part {
+        pliant_sim::ParticipantSetup {
             name: name.clone(),
             model: Arc::clone(&built.model),
             method: method(built, &scene.run, plan),

@@ -3,10 +3,10 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use pliant_implicit::{Assembly, CurvedSurface, State};
+use pliant_implicit::{Assembly, AssemblyState, CurvedSurface};
 use pliant_mechanics::fingerprint;
 
-/// Bodies of the implicit solvers, on the nodes of [`Part::model`](crate::Part::model).
+/// Bodies of the implicit solvers, on the nodes of [`Part::model`](crate::ParticipantSetup::model).
 #[derive(Clone, Debug)]
 pub struct ImplicitBodies {
     /// Their shells, with the model of their nodes.
@@ -16,7 +16,7 @@ pub struct ImplicitBodies {
     /// Quantity that a static run prescribes instead of the size of a load.
     pub control: Option<RunControl>,
     /// The state that a run starts from.
-    pub start: State,
+    pub start: AssemblyState,
     /// The curved surface of the shells, if something is carried by it.
     pub surface: Option<CurvedSurface>,
 }
@@ -76,7 +76,7 @@ impl ImplicitBodies {
             0 => BodyCells::Solids,
             facets => BodyCells::Facets(0..facets),
         };
-        let start = State::at_rest(&model);
+        let start = AssemblyState::at_rest(&model);
         Self { model, cells: vec![cells], start, control: None, surface: None }
     }
 

@@ -23,8 +23,8 @@ use pliant_mechanics::tensor::{Vector, add, cross, dot, scale, sub};
 use serde::{Deserialize, Serialize};
 
 use crate::failure::Failure;
-use crate::part::{Method, Part};
 use crate::participant::Participant;
+use crate::participant_setup::{Method, ParticipantSetup};
 
 /// Difference of the forces on both sides at which a step is found, over the mean force of the impulses.
 const FOUND: f64 = 0.01;
@@ -37,7 +37,7 @@ const FIRM: f64 = 4.0;
 /// [`coupled_nodes`](pliant_contact::touch::Contacts::coupled_nodes).
 #[derive(Clone, Debug)]
 pub struct CoupledSurface {
-    /// The explicit participant, by its place in the world.
+    /// The explicit participant, by its place in the setup.
     pub host: usize,
     /// The implicit participant whose nodes they are.
     pub of: usize,
@@ -48,7 +48,7 @@ pub struct CoupledSurface {
 /// The contact of two participants at an instant.
 #[derive(Clone, Copy, Debug)]
 pub struct CoupledSurfaceNow {
-    /// The explicit and the implicit participant, by their places in the world.
+    /// The explicit and the implicit participant, by their places in the setup.
     pub parts: [usize; 2],
     /// The mean force [N] over the last step on the explicit and on the implicit one.
     pub forces: [Vector<f64>; 2],
@@ -135,14 +135,14 @@ pub(crate) struct Meetings {
 }
 
 impl Meetings {
-    /// Makes the coupled nodes of a world, from a remembered state or an empty one. `ratios` are the steps of
+    /// Makes the coupled nodes of a setup, from a remembered state or an empty one. `ratios` are the steps of
     /// each participant between common instants.
     ///
     /// # Errors
     /// If participants cannot be coupled like this.
     pub(crate) fn new(
         sets: &[CoupledSurface],
-        parts: &[Part],
+        parts: &[ParticipantSetup],
         ratios: &[u64],
         memory: CouplingMemory,
     ) -> Result<Self, Failure> {
@@ -181,7 +181,7 @@ impl Meetings {
             let awaited = part.method.contacts().map_or(0, |contacts| contacts.coupled_nodes.len());
             if awaited != count {
                 return Err(Failure::input(&format_args!(
-                    "contacts of participant `{}` expect {awaited} nodes of other participants, but the world has {count}",
+                    "contacts of participant `{}` expect {awaited} nodes of other participants, but the setup has {count}",
                     part.name
                 )));
             }
@@ -213,7 +213,7 @@ impl Meetings {
 
     /// Prepares the first pass of a step from where all participants meet: forces and places to be expected,
     /// so that forces can be found there.
-    pub(crate) fn meet(&mut self, parts: &[Part], participants: &mut [Box<dyn Participant>]) {
+    pub(crate) fn meet(&mut self, parts: &[ParticipantSetup], participants: &mut [Box<dyn Participant>]) {
         for (set, Places { all, .. }) in self.sets.iter().zip(&self.places) {
             let (step, own) = (parts[set.of].steps.step, participants[set.of].as_ref());
             let remembered = &self.memory.nodes[all.clone()];
@@ -228,7 +228,12 @@ impl Meetings {
     }
 
     /// Follows the step of a participant, before its hosts take theirs.
-    pub(crate) fn after(&mut self, part: usize, parts: &[Part], participants: &mut [Box<dyn Participant>]) {
+    pub(crate) fn after(
+        &mut self,
+        part: usize,
+        parts: &[ParticipantSetup],
+        participants: &mut [Box<dyn Participant>],
+    ) {
         for (_, Places { all, .. }) in self.sets.iter().zip(&self.places).filter(|(set, _)| set.of == part) {
             for coupled in &mut self.coupled_nodes[all.clone()] {
                 coupled.way[1] = coupled.place(participants[part].as_ref());
@@ -242,7 +247,7 @@ impl Meetings {
     fn lead(
         &mut self,
         of: impl Fn(&CoupledSurface) -> bool,
-        parts: &[Part],
+        parts: &[ParticipantSetup],
         participants: &mut [Box<dyn Participant>],
     ) {
         let Self { sets, places, coupled_nodes, ways, .. } = self;
@@ -270,7 +275,7 @@ impl Meetings {
     pub(crate) fn settle(
         &mut self,
         pass: u32,
-        parts: &[Part],
+        parts: &[ParticipantSetup],
         participants: &[Box<dyn Participant>],
     ) -> bool {
         let Self { sets, places, coupled_nodes, memory, .. } = self;
@@ -348,7 +353,7 @@ impl CoupledSurface {
     ///
     /// # Errors
     /// If one is not explicit on the CPU, the other one not implicit, or nodes are not theirs.
-    pub fn check(&self, parts: &[Part]) -> Result<(), Failure> {
+    pub fn check(&self, parts: &[ParticipantSetup]) -> Result<(), Failure> {
         let [Some(host), Some(of)] = [self.host, self.of].map(|part| parts.get(part)) else {
             return Err(Failure::input(
                 &"a contact between participants names a participant that does not exist",
@@ -379,13 +384,13 @@ impl CoupledSurface {
         Ok(())
     }
 
-    fn refused(&self, parts: &[Part], why: &str) -> Failure {
+    fn refused(&self, parts: &[ParticipantSetup], why: &str) -> Failure {
         Failure::input(&format_args!("contact between participants: `{}` {why}", parts[self.of].name))
     }
 }
 
 /// Contacts of a host whose surfaces have nodes of a set.
-fn surfaces<'a>(host: &'a Part, coupled_nodes: &Range<u32>) -> impl Iterator<Item = &'a Contact> {
+fn surfaces<'a>(host: &'a ParticipantSetup, coupled_nodes: &Range<u32>) -> impl Iterator<Item = &'a Contact> {
     let coupled_nodes = coupled_nodes.clone();
     let all = host.method.contacts().into_iter().flat_map(|contacts| &contacts.contacts);
     all.filter(move |contact| {
@@ -404,7 +409,11 @@ fn add_areas(surface: &Surface, place: impl Fn(u32) -> Vector<f64>, mut add_to: 
 }
 
 /// The share of each coupled node [m²] in the surfaces that it is part of, at rest.
-fn areas(host: &Part, coupled_nodes: &Range<u32>, place: impl Fn(u32) -> Vector<f64>) -> Vec<f64> {
+fn areas(
+    host: &ParticipantSetup,
+    coupled_nodes: &Range<u32>,
+    place: impl Fn(u32) -> Vector<f64>,
+) -> Vec<f64> {
     let mut areas = vec![0.0_f64; coupled_nodes.len()];
     for contact in surfaces(host, coupled_nodes) {
         let mut own = vec![0.0; coupled_nodes.len()];
@@ -419,7 +428,7 @@ fn areas(host: &Part, coupled_nodes: &Range<u32>, place: impl Fn(u32) -> Vector<
 }
 
 /// Mass of the nodes of a host's surfaces that meet coupled nodes, over their area [kg/m²].
-fn mass_per_area(host: &Part, coupled_nodes: &Range<u32>) -> f64 {
+fn mass_per_area(host: &ParticipantSetup, coupled_nodes: &Range<u32>) -> f64 {
     let (mut mass, mut area) = (0.0, 0.0);
     for contact in surfaces(host, coupled_nodes) {
         for surface in

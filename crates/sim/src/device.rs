@@ -8,7 +8,7 @@ use pliant_gpu::{DeviceMapping, GpuError, GpuStepper, PointValue, StepFailure};
 use pliant_mechanics::grip::Grip;
 
 use crate::failure::{Failure, FailureKind};
-use crate::part::{Method, Part};
+use crate::participant_setup::{Method, ParticipantSetup};
 use crate::solver::{LoadStepProgress, Solver};
 
 /// The place of a point at rest [m], and its nodes with their weights.
@@ -64,7 +64,10 @@ impl Failure {
 }
 
 /// The solver of a participant on a GPU, from a state on; `None` of a participant on the CPU.
-pub(crate) fn on_device(part: &Part, state: &State<f32>) -> Option<Result<Box<dyn Solver<f32>>, Failure>> {
+pub(crate) fn on_device(
+    part: &ParticipantSetup,
+    state: &State<f32>,
+) -> Option<Result<Box<dyn Solver<f32>>, Failure>> {
     let Method::Explicit(settings) = &part.method else { return None };
     let device = settings.device.as_ref()?;
     let (model, step, design) = (Arc::clone(&part.model), part.steps.step, settings.design);

@@ -116,7 +116,7 @@ pub trait Instant {
     }
 
     /// The state of shells, and of solids whose equations are solved.
-    fn shells(&self) -> Option<&pliant_implicit::State> {
+    fn shells(&self) -> Option<&pliant_implicit::AssemblyState> {
         None
     }
 

@@ -1,6 +1,6 @@
-//! A simulation of many bodies. A [`World`] holds participants: bodies that one stepper advances together.
+//! A simulation of many bodies. A [`Setup`] holds participants: bodies that one stepper advances together.
 //! Steps are explicit, quasi-static, static or implicit. They run on the CPU or (feature `gpu`, on by
-//! default) a GPU. A [`Simulation`] owns a world and its state, and knows nothing of files or windows. SI
+//! default) a GPU. A [`Simulation`] owns a setup and its state, and knows nothing of files or windows. SI
 //! units throughout.
 //!
 //! Two participants, each at its own step:
@@ -12,7 +12,7 @@
 //! use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
 //! use pliant_mechanics::load::Load;
 //! use pliant_mechanics::model::{Cells, Material, Model, Solid};
-//! use pliant_sim::{Part, Simulation, World};
+//! use pliant_sim::{ParticipantSetup, Simulation, Setup};
 //!
 //! let corners = [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]];
 //! let mut tissue = Model::default();
@@ -27,8 +27,8 @@
 //! wall.add_shell(&Shell::new("wall", vec![[0, 1, 2]], 0.001, material))?;
 //! wall.model_mut().loads.push(Load::gravity(0, [0.0, 0.0, -9.81]));
 //!
-//! let parts = vec![Part::explicit("tissue", tissue, 0.1)?, Part::implicit("wall", wall, 0.1, 0.01)];
-//! let mut simulation = Simulation::new(World::new(parts))?;
+//! let parts = vec![ParticipantSetup::explicit("tissue", tissue, 0.1)?, ParticipantSetup::implicit("wall", wall, 0.1, 0.01)];
+//! let mut simulation = Simulation::new(Setup::new(parts))?;
 //! simulation.run(0.1, |_| ())?;
 //! let frame = simulation.frame()?;
 //! for body in ["tissue", "wall"] {
@@ -46,8 +46,8 @@ mod coupled_surfaces;
 mod device;
 mod failure;
 mod instant;
-mod part;
 mod participant;
+mod participant_setup;
 mod path;
 mod penalty;
 mod reals;
@@ -66,11 +66,11 @@ pub use coupled_surfaces::{CoupledSurface, CoupledSurfaceNow};
 pub use device::{MappedPoint, OnDevice};
 pub use failure::{BlockedDriver, FailedLoadStep, Failure, FailureKind, panicked};
 pub use instant::{CellsNow, Effort, Instant};
-pub use part::{Explicit, LongSteps, Method, Part, Precision, ShortSteps};
+pub use participant_setup::{Explicit, LongSteps, Method, ParticipantSetup, Precision, ShortSteps};
 pub use penalty::{PenaltyTie, TieNow};
 pub use reals::Reals;
 pub use schedule::Schedule;
-pub use simulation::{Frame, Observer, Simulation, State, World};
+pub use simulation::{Frame, Observer, Setup, Simulation, SimulationState};
 pub use solver::{Equilibria, LoadStepProgress};
 pub use steps::{Critical, SAFETY, Steps};
 pub use tools::{ToolNow, pose_of};

@@ -1,7 +1,7 @@
 //! A run by arc length.
 
 use pliant_geometry::words::{counted, number};
-use pliant_implicit::{Assembly, State};
+use pliant_implicit::{Assembly, AssemblyState};
 use pliant_mechanics::count;
 use serde::{Deserialize, Serialize};
 
@@ -36,7 +36,7 @@ impl Path {
     }
 
     /// Returns the reason why the path ends here, if it does.
-    pub(crate) fn end(&self, stop: &Stop, state: &State, model: &Assembly) -> Option<String> {
+    pub(crate) fn end(&self, stop: &Stop, state: &AssemblyState, model: &Assembly) -> Option<String> {
         let limit = number(stop.load_factor.unwrap_or(f64::INFINITY));
         if stop.load_factor.is_some_and(|limit| self.factor.abs() >= limit) {
             return Some(format!(

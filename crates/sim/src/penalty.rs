@@ -20,8 +20,8 @@ use pliant_mechanics::tensor::{Vector, add, dot, scale, sub};
 use serde::{Deserialize, Serialize};
 
 use crate::failure::Failure;
-use crate::part::{Method, Part};
 use crate::participant::Participant;
+use crate::participant_setup::{Method, ParticipantSetup};
 
 /// Ratio a/b: the stiffness k is this ratio times c/H.
 const SPRING: f64 = 1.0;
@@ -35,7 +35,7 @@ const LEAST: f64 = 0.02;
 pub struct PenaltyTie {
     /// Its name.
     pub name: String,
-    /// The participants, by their place in the world.
+    /// The participants, by their place in the setup.
     pub parts: [usize; 2],
     /// The points in each, as many in one as in the other: rows over the nodes of its model that sum to 1.
     pub points: [Weights; 2],
@@ -57,7 +57,7 @@ pub struct TieNow<'a> {
     pub widest: f64,
 }
 
-/// State of the ties of a world that a restart needs.
+/// State of the ties of a setup that a restart needs.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct TieMemory {
     /// Forces of each point on its slower and its faster side [N], and the impulse that the slower side is
@@ -145,11 +145,15 @@ pub(crate) struct Springs {
 }
 
 impl Springs {
-    /// Makes the springs of a world, from a remembered state or an empty one.
+    /// Makes the springs of a setup, from a remembered state or an empty one.
     ///
     /// # Errors
     /// If a participant takes part in no ties.
-    pub(crate) fn new(ties: &[PenaltyTie], parts: &[Part], memory: TieMemory) -> Result<Self, Failure> {
+    pub(crate) fn new(
+        ties: &[PenaltyTie],
+        parts: &[ParticipantSetup],
+        memory: TieMemory,
+    ) -> Result<Self, Failure> {
         let mut points = Vec::new();
         // Sum of the weights of all points at each node.
         let mut shares: Vec<Vec<f64>> = parts.iter().map(|part| vec![0.0; part.model.node_count()]).collect();
@@ -234,7 +238,7 @@ impl Springs {
     }
 
     /// Lets a participant feel in its next step what those with shorter steps have felt since its last one.
-    pub(crate) fn settle(&mut self, part: usize, parts: &[Part]) {
+    pub(crate) fn settle(&mut self, part: usize, parts: &[ParticipantSetup]) {
         let own =
             self.points.iter().zip(&mut self.memory.points).filter(|(point, _)| point.slow.part == part);
         for (_, [on_slow, _, owed]) in own {
@@ -247,7 +251,7 @@ impl Springs {
     pub(crate) fn after(
         &mut self,
         part: usize,
-        parts: &[Part],
+        parts: &[ParticipantSetup],
         participants: &[Box<dyn Participant>],
         ahead: impl Fn(usize) -> f64,
     ) {
@@ -311,7 +315,7 @@ impl Springs {
 }
 
 /// The part of the limit of stability that ties can take of a participant.
-fn room(part: &Part) -> f64 {
+fn room(part: &ParticipantSetup) -> f64 {
     let critical = match (&part.method, part.method.bodies()) {
         (Method::Explicit(settings), _) => settings.critical_step,
         (_, Some(bodies)) => pliant_implicit::ExplicitShells::stable_step(&bodies.model),
@@ -321,7 +325,7 @@ fn room(part: &Part) -> f64 {
 }
 
 /// Mass [kg] of a node as its participant steps it.
-fn mass_of(part: &Part, node: u32) -> f64 {
+fn mass_of(part: &ParticipantSetup, node: u32) -> f64 {
     match part.method.bodies() {
         Some(bodies) => bodies.model.mass[node as usize],
         None => part.model.inertia(node as usize),
@@ -333,7 +337,7 @@ impl PenaltyTie {
     ///
     /// # Errors
     /// If springs can't hold both sides.
-    pub fn slower(&self, parts: &[Part]) -> Result<usize, Failure> {
+    pub fn slower(&self, parts: &[ParticipantSetup]) -> Result<usize, Failure> {
         let refused = |why: String| Failure::input(&format_args!("tie `{}`: {why}", self.name));
         let [a, b] = self.parts;
         if a == b || a.max(b) >= parts.len() || self.points[0].len() != self.points[1].len() {

@@ -16,7 +16,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use crate::instant::Effort;
-use crate::part::{Method, Part, Precision};
+use crate::participant_setup::{Method, ParticipantSetup, Precision};
 use crate::path::Path;
 use crate::solver::Memory;
 
@@ -34,7 +34,7 @@ pub(crate) enum Snapshot {
 impl Snapshot {
     /// Reads the snapshot of a participant from bytes; `None` if the bytes are no snapshot, or of another
     /// size.
-    pub fn decode(part: &Part, bytes: &[u8]) -> Option<Self> {
+    pub fn decode(part: &ParticipantSetup, bytes: &[u8]) -> Option<Self> {
         fn read<T: DeserializeOwned>(bytes: &[u8]) -> Option<T> {
             postcard::from_bytes(bytes).ok()
         }
@@ -89,7 +89,7 @@ impl Snapshot {
     }
 
     /// True if the snapshot has the sizes of a participant's model, and is of its method.
-    pub fn fits(&self, part: &Part) -> bool {
+    pub fn fits(&self, part: &ParticipantSetup) -> bool {
         match self {
             Self::Single(state, memory) => fits(state, memory, part),
             Self::Double(state, memory) => fits(state, memory, part),
@@ -161,7 +161,7 @@ impl ContactState {
 
 impl ImplicitState {
     /// True if the state has the sizes of a participant's model and contacts.
-    pub(crate) fn fits(&self, part: &Part) -> bool {
+    pub(crate) fn fits(&self, part: &ParticipantSetup) -> bool {
         let model: &Model = &part.model;
         let nodes = model.node_count();
         let before = self.before.iter().all(|(forces, state)| forces.len() == 6 * nodes && state.fits(model));
@@ -203,7 +203,7 @@ pub(crate) struct PlainState {
 }
 
 impl PlainState {
-    pub fn of(state: &pliant_implicit::State) -> Self {
+    pub fn of(state: &pliant_implicit::AssemblyState) -> Self {
         let plain = |vectors: &[Vector3<f64>]| vectors.iter().map(|&v| v.into()).collect();
         Self {
             time: state.time,
@@ -228,10 +228,10 @@ impl PlainState {
             && work.len() == rest.work.len()
     }
 
-    pub fn state(&self) -> pliant_implicit::State {
+    pub fn state(&self) -> pliant_implicit::AssemblyState {
         let vectors = |plain: &[[f64; 3]]| plain.iter().map(|&v| v.into()).collect();
         let rotation = |&q: &[f64; 4]| UnitQuaternion::new_unchecked(Quaternion::from(Vector4::from(q)));
-        pliant_implicit::State {
+        pliant_implicit::AssemblyState {
             time: self.time,
             load_factor: self.load_factor,
             position: vectors(&self.position),
@@ -267,7 +267,7 @@ pub(crate) struct Iterated {
 }
 
 /// True if a state and its memory have the sizes of a participant's, and are of its method.
-fn fits<R: Scalar>(state: &State<R>, memory: &Memory<R>, part: &Part) -> bool {
+fn fits<R: Scalar>(state: &State<R>, memory: &Memory<R>, part: &ParticipantSetup) -> bool {
     let model: &Model = &part.model;
     let found = matches!(memory, Memory::Equilibrium(_));
     if found != matches!(part.method, Method::QuasiStatic { .. }) {

@@ -18,8 +18,8 @@ use pliant_mechanics::{Energies, Model, fingerprint};
 
 use crate::failure::Failure;
 use crate::instant::{CellsNow, Instant};
-use crate::part::Part;
 use crate::participant::Participant;
+use crate::participant_setup::ParticipantSetup;
 use crate::reals::{Reals, RealsMut};
 use crate::snapshot::Snapshot;
 use crate::solver::{Equilibria, LoadStepProgress, Memory, Solver, on_cpu};
@@ -42,7 +42,7 @@ pub(crate) trait Numeric: Scalar {
     ///
     /// # Errors
     /// If it can't be made.
-    fn solver(part: &Part, state: &State<Self>) -> Result<Box<dyn Solver<Self>>, Failure>;
+    fn solver(part: &ParticipantSetup, state: &State<Self>) -> Result<Box<dyn Solver<Self>>, Failure>;
 
     /// The GPU's stepper with its state; `None` of solids on the CPU.
     #[cfg(feature = "gpu")]
@@ -72,7 +72,7 @@ impl Numeric for f32 {
         not(feature = "gpu"),
         expect(unused_variables, reason = "only a GPU takes up a state when it is made")
     )]
-    fn solver(part: &Part, state: &State<f32>) -> Result<Box<dyn Solver<f32>>, Failure> {
+    fn solver(part: &ParticipantSetup, state: &State<f32>) -> Result<Box<dyn Solver<f32>>, Failure> {
         #[cfg(feature = "gpu")]
         if let Some(solver) = crate::device::on_device(part, state) {
             return solver;
@@ -103,7 +103,7 @@ impl Numeric for f64 {
         if let Snapshot::Double(state, memory) = snapshot { Some((state, memory)) } else { None }
     }
 
-    fn solver(part: &Part, _state: &State<f64>) -> Result<Box<dyn Solver<f64>>, Failure> {
+    fn solver(part: &ParticipantSetup, _state: &State<f64>) -> Result<Box<dyn Solver<f64>>, Failure> {
         on_cpu(part)
     }
 }
@@ -122,7 +122,7 @@ impl<R: Numeric> Solids<R> {
     ///
     /// # Errors
     /// If the stepper can't be made.
-    pub(crate) fn new(part: &Part, state: State<R>) -> Result<Self, Failure> {
+    pub(crate) fn new(part: &ParticipantSetup, state: State<R>) -> Result<Self, Failure> {
         if let Some(load) = part.model.loads.iter().find(|load| load.is_for_shells()) {
             return Err(Failure::input(&format_args!(
                 "`{}` is a load of shells, and solids cannot take it",

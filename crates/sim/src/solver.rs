@@ -15,7 +15,7 @@ use pliant_mechanics::tensor::Vector;
 use serde::{Deserialize, Serialize};
 
 use crate::failure::Failure;
-use crate::part::{Method, Part};
+use crate::participant_setup::{Method, ParticipantSetup};
 use crate::steps::Steps;
 
 /// Progress of a load step.
@@ -151,7 +151,7 @@ pub(crate) trait Solver<R>: Send {
 }
 
 /// The solver of a participant on the CPU.
-pub(crate) fn on_cpu<R: Scalar>(part: &Part) -> Result<Box<dyn Solver<R>>, Failure> {
+pub(crate) fn on_cpu<R: Scalar>(part: &ParticipantSetup) -> Result<Box<dyn Solver<R>>, Failure> {
     let model = || Arc::clone(&part.model);
     let contradicting = |error: Contradiction| Failure::input(&error);
     Ok(match &part.method {

@@ -5,8 +5,8 @@ use pliant_mechanics::Model;
 
 use crate::assembled::Assembled;
 use crate::failure::Failure;
-use crate::part::{Explicit, Method, Part, Precision};
 use crate::participant::Participant;
+use crate::participant_setup::{Explicit, Method, ParticipantSetup, Precision};
 use crate::snapshot::Snapshot;
 use crate::solids::{Numeric, Solids};
 use crate::solver::Memory;
@@ -15,7 +15,7 @@ use crate::solver::Memory;
 ///
 /// # Errors
 /// If its stepper can't be made.
-pub(crate) fn begin(part: &Part) -> Result<Box<dyn Participant>, Failure> {
+pub(crate) fn begin(part: &ParticipantSetup) -> Result<Box<dyn Participant>, Failure> {
     part.has_room()?;
     Ok(match (part.method.bodies(), part.method.precision()) {
         (Some(bodies), _) => Box::new(Assembled::new(part, bodies)?),
@@ -28,7 +28,7 @@ pub(crate) fn begin(part: &Part) -> Result<Box<dyn Participant>, Failure> {
 ///
 /// # Errors
 /// If the displacements that are given are of another model.
-fn at_start<R: Numeric>(part: &Part) -> Result<State<R>, Failure> {
+fn at_start<R: Numeric>(part: &ParticipantSetup) -> Result<State<R>, Failure> {
     let mut state = State::at_rest(&part.model);
     if let Method::Explicit(Explicit { start: Some(start), .. }) = &part.method {
         if start.len() != state.displacement.len() {
@@ -55,7 +55,7 @@ pub(crate) struct Before<'a> {
 /// # Errors
 /// If its stepper can't be made.
 pub(crate) fn go_on(
-    part: &Part,
+    part: &ParticipantSetup,
     snapshot: Snapshot,
     before: Option<Before<'_>>,
 ) -> Result<Option<Box<dyn Participant>>, Failure> {
@@ -80,7 +80,7 @@ pub(crate) fn go_on(
 }
 
 fn resumed<R: Numeric>(
-    part: &Part,
+    part: &ParticipantSetup,
     mut state: State<R>,
     memory: Memory<R>,
     before: Option<Before<'_>>,

@@ -117,10 +117,10 @@ impl Simulation {
         opening: Option<f64>,
         within: f64,
     ) -> Result<f64, Failure> {
-        let world = Arc::clone(self.world());
+        let setup = Arc::clone(self.setup());
         let evaluated = self.is_evaluated();
         let mut legs = Vec::new();
-        for (index, (part, now)) in world.parts.iter().zip(self.instants()).enumerate() {
+        for (index, (part, now)) in setup.parts.iter().zip(self.instants()).enumerate() {
             let step = part.steps.step_from(now.time());
             // The forces of an explicit step know where the tool goes in it; equations are solved for with
             // the new way.
@@ -154,7 +154,7 @@ impl Simulation {
             arrival = Some(begin + duration);
         }
         arrival.ok_or_else(|| {
-            let rigids = world.parts.iter().filter_map(|part| part.method.contacts());
+            let rigids = setup.parts.iter().filter_map(|part| part.method.contacts());
             let mut known: Vec<&str> = rigids.flat_map(|all| &all.rigids).map(Rigid::tool).collect();
             known.dedup();
             Failure::input(&match known.is_empty() {
@@ -177,7 +177,7 @@ impl Simulation {
     /// without one of this name. The pose of a jaw is the pose of its shape.
     pub fn tool(&self, name: &str) -> Option<ToolNow> {
         let mut found: Option<ToolNow> = None;
-        for (part, now) in self.world().parts.iter().zip(self.instants()) {
+        for (part, now) in self.setup().parts.iter().zip(self.instants()) {
             let Some(all) = part.method.contacts() else { continue };
             let own = |number: usize| [all.rigids[number].tool(), &all.rigids[number].name].contains(&name);
             let Some(number) = (0..all.rigids.len()).find(|&number| own(number)) else { continue };

@@ -12,7 +12,7 @@ use pliant_mechanics::prony::{self, Prony, PronyTerm, PronyUpdate};
 use pliant_mechanics::{Energies, Model};
 use pliant_shells::element::Elasticity;
 use pliant_shells::element::Wall;
-use pliant_sim::{Method, Part, Precision, ShortSteps, Simulation, State, World};
+use pliant_sim::{Method, ParticipantSetup, Precision, Setup, ShortSteps, Simulation, SimulationState};
 
 /// Duration of a run [s].
 const DURATION: f64 = 0.1;
@@ -48,32 +48,34 @@ fn strip() -> pliant_implicit::Assembly {
 }
 
 /// A part of every method, with a cube of a shear modulus [Pa] where it holds solids.
-fn parts(shear: f64) -> Vec<Part> {
-    let explicit = Part::explicit("cube", cube(shear), DURATION).unwrap();
+fn parts(shear: f64) -> Vec<ParticipantSetup> {
+    let explicit = ParticipantSetup::explicit("cube", cube(shear), DURATION).unwrap();
     let mut single = explicit.clone();
     let Method::Explicit(settings) = &mut single.method else { unreachable!("an explicit part") };
     settings.precision = Precision::Single;
-    let quasi_static = Part::quasi_static("cube", cube(shear), DURATION, 4);
-    let equilibria = Part::equilibria("strip", strip(), DURATION, 4);
-    let implicit = Part::implicit("strip", strip(), DURATION, 0.01);
+    let quasi_static = ParticipantSetup::quasi_static("cube", cube(shear), DURATION, 4);
+    let equilibria = ParticipantSetup::equilibria("strip", strip(), DURATION, 4);
+    let implicit = ParticipantSetup::implicit("strip", strip(), DURATION, 0.01);
     let Method::Implicit(bodies, _) = &implicit.method else { unreachable!("an implicit part") };
-    let shells =
-        Part { method: Method::ExplicitShells(bodies.clone(), ShortSteps::default()), ..implicit.clone() };
+    let shells = ParticipantSetup {
+        method: Method::ExplicitShells(bodies.clone(), ShortSteps::default()),
+        ..implicit.clone()
+    };
     let stable = pliant_implicit::ExplicitShells::stable_step(&bodies.model);
-    let shells = Part { steps: pliant_sim::Steps::within(DURATION, 0.9 * stable), ..shells };
+    let shells = ParticipantSetup { steps: pliant_sim::Steps::within(DURATION, 0.9 * stable), ..shells };
     vec![explicit, single, quasi_static, equilibria, implicit, shells, relaxing(shear)]
 }
 
 /// The cube as a material that relaxes, in steps whose limit is monitored.
-fn relaxing(shear: f64) -> Part {
+fn relaxing(shear: f64) -> ParticipantSetup {
     let mut model = cube(shear);
     let terms = [
-        PronyTerm { part: prony::Part::Isochoric, weight: 0.5, time: 0.02 },
-        PronyTerm { part: prony::Part::Volumetric, weight: 0.2, time: 0.05 },
+        PronyTerm { part: prony::PronyPart::Isochoric, weight: 0.5, time: 0.02 },
+        PronyTerm { part: prony::PronyPart::Volumetric, weight: 0.2, time: 0.05 },
     ];
     model.solids[0].material.prony = Prony::new(&terms, PronyUpdate::BackwardEuler).unwrap();
     model.initial_velocity = vec![[0.01, 0.0, 0.0]; 8];
-    Part::explicit("cube", model, DURATION).unwrap()
+    ParticipantSetup::explicit("cube", model, DURATION).unwrap()
 }
 
 fn ended(mut simulation: Simulation) -> u64 {
@@ -105,9 +107,9 @@ fn a_state_goes_on_with_the_same_bits_in_every_method() {
         simulation.restore(state.clone()).unwrap();
         assert_eq!(simulation.time(), time);
         assert_eq!(ended(simulation), whole);
-        let world = World::from(part);
-        let read = State::decode(&world, &bytes).unwrap();
-        assert_eq!(ended(Simulation::resumed(world, read).unwrap()), whole);
+        let setup = Setup::from(part);
+        let read = SimulationState::decode(&setup, &bytes).unwrap();
+        assert_eq!(ended(Simulation::resumed(setup, read).unwrap()), whole);
     }
 }
 
@@ -117,7 +119,7 @@ fn a_state_goes_on_with_the_same_bits_in_every_method() {
 fn a_state_can_be_taken_at_a_look_in_every_method() {
     for part in parts(1e5) {
         let whole = ended(Simulation::new(part.clone()).unwrap());
-        let world = World::from(part.clone());
+        let setup = Setup::from(part.clone());
         let mut simulation = Simulation::new(part.clone()).unwrap();
         let mut looks = 0;
         while simulation.time() + 0.5 * simulation.step_length() < DURATION {
@@ -133,7 +135,8 @@ fn a_state_can_be_taken_at_a_look_in_every_method() {
                 0 => simulation.restore(state).unwrap(),
                 1 => {
                     simulation =
-                        Simulation::resumed(world.clone(), State::decode(&world, &bytes).unwrap()).unwrap()
+                        Simulation::resumed(setup.clone(), SimulationState::decode(&setup, &bytes).unwrap())
+                            .unwrap()
                 }
                 _ => {}
             }
@@ -153,31 +156,36 @@ fn a_state_is_of_its_model() {
     let state = simulation.state().unwrap();
     let bytes = simulation.encode().unwrap();
     for other in [quasi_static, equilibria] {
-        let world = World::from(other.clone());
-        let refused = Simulation::resumed(world.clone(), state.clone()).err().unwrap();
+        let setup = Setup::from(other.clone());
+        let refused = Simulation::resumed(setup.clone(), state.clone()).err().unwrap();
         assert!(refused.message.contains("of another model"), "{refused}");
-        assert!(State::decode(&world, &bytes).is_none_or(|read| Simulation::resumed(world, read).is_err()));
+        assert!(
+            SimulationState::decode(&setup, &bytes)
+                .is_none_or(|read| Simulation::resumed(setup, read).is_err())
+        );
     }
-    assert!(State::decode(simulation.world(), &[&bytes[0][..bytes[0].len() / 2]]).is_none());
-    assert!(State::decode::<Vec<u8>>(simulation.world(), &[]).is_none());
-    assert!(Simulation::new(World::new(Vec::new())).is_err());
+    assert!(SimulationState::decode(simulation.setup(), &[&bytes[0][..bytes[0].len() / 2]]).is_none());
+    assert!(SimulationState::decode::<Vec<u8>>(simulation.setup(), &[]).is_none());
+    assert!(Simulation::new(Setup::new(Vec::new())).is_err());
 }
 
 #[test]
 fn numbers_change_on_the_way() {
-    let mut simulation = Simulation::new(Part::explicit("cube", cube(1e5), DURATION).unwrap()).unwrap();
+    let mut simulation =
+        Simulation::new(ParticipantSetup::explicit("cube", cube(1e5), DURATION).unwrap()).unwrap();
     while simulation.time() < 0.5 * DURATION {
         simulation.step(1).unwrap();
     }
     let soft = simulation.frame().unwrap().reaction("top").unwrap()[2];
     simulation.step(1).unwrap();
-    let (time, stiffer) = (simulation.time(), Part::explicit("cube", cube(4e5), DURATION).unwrap());
+    let (time, stiffer) =
+        (simulation.time(), ParticipantSetup::explicit("cube", cube(4e5), DURATION).unwrap());
     assert!(simulation.exchange(stiffer).unwrap());
     assert_eq!(simulation.time(), time);
     let stiff = simulation.frame().unwrap().reaction("top").unwrap()[2];
     assert!(stiff > 2.0 * soft, "{soft} N, then {stiff} N");
     simulation.step(1).unwrap();
-    let other = Part::equilibria("strip", strip(), DURATION, 4);
+    let other = ParticipantSetup::equilibria("strip", strip(), DURATION, 4);
     assert!(!simulation.exchange(other).unwrap());
     simulation.run(DURATION, |_| ()).unwrap();
 }
@@ -185,12 +193,12 @@ fn numbers_change_on_the_way() {
 #[test]
 fn participants_meet_at_common_instants() {
     let parts = vec![
-        Part::explicit("cube", cube(1e5), DURATION).unwrap(),
-        Part::implicit("strip", strip(), DURATION, 0.03),
+        ParticipantSetup::explicit("cube", cube(1e5), DURATION).unwrap(),
+        ParticipantSetup::implicit("strip", strip(), DURATION, 0.03),
     ];
     let alone: Vec<u64> = parts.iter().map(|part| part.steps.number).collect();
-    let mut simulation = Simulation::new(World::new(parts)).unwrap();
-    let numbers: Vec<u64> = simulation.world().parts.iter().map(|part| part.steps.number).collect();
+    let mut simulation = Simulation::new(Setup::new(parts)).unwrap();
+    let numbers: Vec<u64> = simulation.setup().parts.iter().map(|part| part.steps.number).collect();
     assert_eq!((numbers[1], numbers[0] % numbers[1]), (alone[1], 0));
     assert!(numbers[0] >= alone[0] && numbers[0] < alone[0] + numbers[1]);
     let mut times = Vec::new();
@@ -206,10 +214,10 @@ fn participants_meet_at_common_instants() {
 #[test]
 fn a_grip_pulls_at_nodes_of_any_participant() {
     let parts = vec![
-        Part::explicit("cube", cube(1e5), DURATION).unwrap(),
-        Part::implicit("strip", strip(), DURATION, 0.01),
+        ParticipantSetup::explicit("cube", cube(1e5), DURATION).unwrap(),
+        ParticipantSetup::implicit("strip", strip(), DURATION, 0.01),
     ];
-    let mut simulation = Simulation::new(World::new(parts)).unwrap();
+    let mut simulation = Simulation::new(Setup::new(parts)).unwrap();
     let node = simulation.node(1, 3);
     assert_eq!((node, simulation.locate(node)), (11, (1, 3)));
     let [x, y, z] = simulation.rest(node);
@@ -225,7 +233,8 @@ fn a_grip_pulls_at_nodes_of_any_participant() {
 
 #[test]
 fn a_load_step_tells_how_far_it_is() {
-    let mut simulation = Simulation::new(Part::quasi_static("cube", cube(1e5), DURATION, 2)).unwrap();
+    let mut simulation =
+        Simulation::new(ParticipantSetup::quasi_static("cube", cube(1e5), DURATION, 2)).unwrap();
     for number in [1, 2] {
         let mut progresses = Vec::new();
         simulation.evaluate(Wanted::Energies).unwrap();
@@ -249,8 +258,8 @@ fn solids_refuse_loads_of_shells() {
         let mut model = cube(1000.0);
         model.loads.push(Load::new("twist", kind, rising()));
         for part in [
-            Part::explicit("cube", model.clone(), DURATION).unwrap(),
-            Part::quasi_static("cube", model, DURATION, 1),
+            ParticipantSetup::explicit("cube", model.clone(), DURATION).unwrap(),
+            ParticipantSetup::quasi_static("cube", model, DURATION, 1),
         ] {
             let message = Simulation::new(part).err().unwrap().to_string();
             assert!(message.contains("`twist` is a load of shells"), "{message}");
@@ -260,7 +269,7 @@ fn solids_refuse_loads_of_shells() {
 
 /// Forces on nodes [N] of a simulation: one on each of these nodes.
 fn on(simulation: &Simulation, nodes: &[u32], force: [f64; 3]) -> Vec<[f64; 3]> {
-    let count: usize = simulation.world().parts.iter().map(|part| part.model.node_count()).sum();
+    let count: usize = simulation.setup().parts.iter().map(|part| part.model.node_count()).sum();
     let mut forces = vec![[0.0; 3]; count];
     nodes.iter().for_each(|&node| forces[node as usize] = force);
     forces
@@ -277,7 +286,7 @@ fn a_pushed_cube_comes_to_rest_against_its_base() {
         let mut model = cube(1e5);
         model.constraints.truncate(1);
         model.bodies[0].damping = 150.0;
-        let mut part = Part::explicit("cube", model, 2.0 * REST).unwrap();
+        let mut part = ParticipantSetup::explicit("cube", model, 2.0 * REST).unwrap();
         let Method::Explicit(settings) = &mut part.method else { unreachable!("an explicit part") };
         settings.precision = precision;
         let mut simulation = Simulation::new(part).unwrap();
@@ -309,9 +318,11 @@ fn a_pushed_cube_comes_to_rest_against_its_base() {
 #[test]
 fn pushed_nodes_are_borne_in_equilibrium() {
     const FORCE: [f64; 3] = [1e-3, -5e-4, 1e-3];
-    let strips =
-        [Part::equilibria("strip", strip(), DURATION, 4), Part::implicit("strip", strip(), 400.0, 1.0)];
-    let cube = Part::quasi_static("cube", cube(1e5), DURATION, 4);
+    let strips = [
+        ParticipantSetup::equilibria("strip", strip(), DURATION, 4),
+        ParticipantSetup::implicit("strip", strip(), 400.0, 1.0),
+    ];
+    let cube = ParticipantSetup::quasi_static("cube", cube(1e5), DURATION, 4);
     let cases = strips.map(|part| (part, [2, 3], "clamp")).into_iter().chain([(cube, [6, 7], "base")]);
     for (part, nodes, base) in cases {
         let borne = |pushed: bool| {

@@ -9,7 +9,7 @@ use pliant_mechanics::mapping::Weights;
 use pliant_mechanics::model::{Cells, Material, Model, Solid};
 use pliant_shells::element::Elasticity;
 use pliant_shells::element::Wall;
-use pliant_sim::{Part, PenaltyTie, Simulation, State, Steps, World};
+use pliant_sim::{ParticipantSetup, PenaltyTie, Setup, Simulation, SimulationState, Steps};
 
 /// Edge of a cell [m].
 const EDGE: f64 = 0.02;
@@ -45,30 +45,30 @@ fn points(nodes: [u32; 4]) -> Weights {
 }
 
 /// Two columns glued end to end, at steps `finer` times finer than the automatic ones.
-fn glued(lower: Model, upper: Model, duration: f64, finer: u64) -> World {
+fn glued(lower: Model, upper: Model, duration: f64, finer: u64) -> Setup {
     let part = |name, model| {
-        let part = Part::explicit(name, model, duration).unwrap();
+        let part = ParticipantSetup::explicit(name, model, duration).unwrap();
         let number = finer * part.steps.number;
-        Part { steps: Steps::within(duration, duration / number as f64), ..part }
+        ParticipantSetup { steps: Steps::within(duration, duration / number as f64), ..part }
     };
     let ties = vec![PenaltyTie {
         name: "glue".into(),
         parts: [0, 1],
         points: [points(end(true)), points(end(false))],
     }];
-    World { ties, ..World::new(vec![part("lower", lower), part("upper", upper)]) }
+    Setup { ties, ..Setup::new(vec![part("lower", lower), part("upper", upper)]) }
 }
 
 /// Momentum [kg m/s] along the columns, with the momentum that the slower one is still to feel.
 fn momentum(simulation: &mut Simulation) -> f64 {
     let frame = simulation.frame().unwrap();
-    let of = |(part, now): (&Part, &dyn pliant_sim::Instant)| -> f64 {
+    let of = |(part, now): (&ParticipantSetup, &dyn pliant_sim::Instant)| -> f64 {
         (0..part.model.node_count()).map(|node| part.model.mass[node] * now.velocity(node)[2]).sum()
     };
     let bodies: f64 = frame.parts().map(of).sum();
     // Velocities are means of the steps before and after an instant, so half of the impulses of this instant
     // are in them.
-    let steps: Vec<f64> = simulation.world().parts.iter().map(|part| part.steps.step).collect();
+    let steps: Vec<f64> = simulation.setup().parts.iter().map(|part| part.steps.step).collect();
     let tie = simulation.ties().next().unwrap();
     bodies + 0.5 * (0..2).map(|part| steps[part] * tie.forces[part][2]).sum::<f64>()
 }
@@ -85,7 +85,7 @@ fn free_bodies_keep_their_momentum_at_steps_of_their_own() {
         lower.initial_velocity = vec![[0.0, 0.0, 0.1]; lower.node_count()];
         let upper = column("upper", 1, stiffer * SOFT, 0.0);
         let mut simulation = Simulation::new(glued(lower, upper, 8.0, finer)).unwrap();
-        let steps: Vec<u64> = simulation.world().parts.iter().map(|part| part.steps.number).collect();
+        let steps: Vec<u64> = simulation.setup().parts.iter().map(|part| part.steps.number).collect();
         let first = momentum(&mut simulation);
         let energy = |simulation: &mut Simulation| {
             let all = simulation.frame().unwrap().energies();
@@ -146,19 +146,23 @@ fn an_implicit_body_hangs_on_an_explicit_one() {
     plate.model_mut().loads.push(Load::gravity(0, [0.0, 0.0, -9.81]));
     let weight = 1000.0 * 0.002 * EDGE * EDGE * 9.81;
     let parts = vec![
-        Part::implicit("plate", plate, duration, 0.001),
-        Part::explicit("upper", upper, duration).unwrap(),
+        ParticipantSetup::implicit("plate", plate, duration, 0.001),
+        ParticipantSetup::explicit("upper", upper, duration).unwrap(),
     ];
     let tie =
         PenaltyTie { name: "glue".into(), parts: [0, 1], points: [points([0, 1, 2, 3]), points(end(false))] };
-    let world = World { ties: vec![tie], ..World::new(parts) };
-    let mut simulation = Simulation::new(world.clone()).unwrap();
+    let setup = Setup { ties: vec![tie], ..Setup::new(parts) };
+    let mut simulation = Simulation::new(setup.clone()).unwrap();
     simulation.run(0.5 * duration, |_| ()).unwrap();
     simulation.step(1).unwrap();
     let bytes = simulation.encode().unwrap();
     assert_eq!(bytes.len(), 3);
-    assert!(State::decode(&world, &bytes[..2]).is_some() && State::decode(&world, &bytes[..1]).is_none());
-    let mut again = Simulation::resumed(world.clone(), State::decode(&world, &bytes).unwrap()).unwrap();
+    assert!(
+        SimulationState::decode(&setup, &bytes[..2]).is_some()
+            && SimulationState::decode(&setup, &bytes[..1]).is_none()
+    );
+    let mut again =
+        Simulation::resumed(setup.clone(), SimulationState::decode(&setup, &bytes).unwrap()).unwrap();
     let ended = |simulation: &mut Simulation| {
         simulation.run(duration, |_| ()).unwrap();
         (simulation.fingerprint(), simulation.frame().unwrap().reaction("base").unwrap()[2])
@@ -173,17 +177,17 @@ fn an_implicit_body_hangs_on_an_explicit_one() {
 
 #[test]
 fn solvers_without_common_steps_are_refused() {
-    let tie = |parts: Vec<Part>| {
+    let tie = |parts: Vec<ParticipantSetup>| {
         let tie = PenaltyTie {
             name: "glue".into(),
             parts: [0, 1],
             points: [points(end(true)), points(end(false))],
         };
-        let world = World { ties: vec![tie], ..World::new(parts) };
-        Simulation::new(world).err().unwrap().message
+        let setup = Setup { ties: vec![tie], ..Setup::new(parts) };
+        Simulation::new(setup).err().unwrap().message
     };
-    let explicit = Part::explicit("a", column("a", 0, SOFT, 0.0), 0.1).unwrap();
-    let still = Part::quasi_static("b", column("b", 1, SOFT, 0.0), 0.1, 4);
+    let explicit = ParticipantSetup::explicit("a", column("a", 0, SOFT, 0.0), 0.1).unwrap();
+    let still = ParticipantSetup::quasi_static("b", column("b", 1, SOFT, 0.0), 0.1, 4);
     let message = tie(vec![explicit.clone(), still]);
     assert!(message.contains("tie `glue`: participant `b` finds equilibria"), "{message}");
     let message = tie(vec![explicit]);

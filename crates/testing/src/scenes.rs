@@ -19,7 +19,7 @@ use pliant_run::{
     failed_output, overview,
 };
 use pliant_scene::{MeshCache, World};
-use pliant_sim::{FailureKind, Simulation, State, StopFlag};
+use pliant_sim::{FailureKind, Simulation, SimulationState, StopFlag};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -150,8 +150,8 @@ pub fn looks_change_nothing(world: &World) {
             if (step / every).is_multiple_of(2) {
                 looked.restore(state).unwrap();
             } else {
-                let state = State::decode(looked.world(), &bytes).unwrap();
-                looked = Simulation::resumed(looked.world().clone(), state).unwrap();
+                let state = SimulationState::decode(looked.setup(), &bytes).unwrap();
+                looked = Simulation::resumed(looked.setup().clone(), state).unwrap();
                 looked.stop_on(&stop);
             }
             assert_eq!(seen(&mut looked), first, "at t = {} s", looked.time());

@@ -99,7 +99,7 @@ pub struct Recording {
     pub steps: u64,
     /// Pulls that broke the run: it went back to a state before them, so that they are not among the moves.
     pub breaks: Vec<Break>,
-    /// [Bodies](pliant_sim::World::fingerprint_of_bodies) of the scene that it is of.
+    /// [Bodies](pliant_sim::Setup::fingerprint_of_bodies) of the scene that it is of.
     pub of: u64,
 }
 

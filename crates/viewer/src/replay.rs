@@ -8,7 +8,7 @@ use pliant_geometry::Vector3;
 use pliant_picture::{Subject, visible};
 use pliant_run::Live;
 use pliant_scene::World;
-use pliant_sim::{State, StopFlag};
+use pliant_sim::{SimulationState, StopFlag};
 use serde::Serialize;
 
 use crate::hand::{Hand, Hold, Which};
@@ -166,13 +166,17 @@ fn subject_of(world: &World, view: &ViewTable, live: &mut Live) -> Result<Subjec
 
 enum Ended<'r> {
     /// Numbers are others from here on.
-    Change(Option<Box<State>>, &'r [Number]),
+    Change(Option<Box<SimulationState>>, &'r [Number]),
     Whole(Replayed),
 }
 
 impl<'r> Replay<'r> {
     /// Continues to the next change of numbers, or to the end.
-    fn play(&mut self, world: &World, from: Option<(World, Option<State>)>) -> Result<Ended<'r>, String> {
+    fn play(
+        &mut self,
+        world: &World,
+        from: Option<(World, Option<SimulationState>)>,
+    ) -> Result<Ended<'r>, String> {
         let (mut live, _) = crate::session::enter(world, from)?;
         live.simulation.stop_on(&self.stop);
         if let Some(surface) = self.surface {

@@ -4,7 +4,7 @@
 
 use std::collections::VecDeque;
 
-use pliant_sim::State;
+use pliant_sim::SimulationState;
 
 use crate::hand::Hold;
 
@@ -23,7 +23,7 @@ const NODE: usize = 250;
 /// A state of a run, with the data of that instant.
 #[derive(Clone)]
 pub(crate) struct Sound {
-    pub state: State,
+    pub state: SimulationState,
     /// Steps done.
     pub steps: u64,
     pub hold: Hold,

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use pliant_gpu::{Device, GpuError, Kind};
 use pliant_implicit::AssemblySolver;
 use pliant_implicit::{
-    Assembly, BackwardEuler, DynamicSettings, ModelError, Phases, Shell, SolveError, State,
+    Assembly, AssemblyState, BackwardEuler, DynamicSettings, ModelError, Phases, Shell, SolveError,
 };
 use pliant_linear::{LinearDevice, LinearSolver, Preconditioner};
 use pliant_mechanics::curve::{Curve, Shape};
@@ -87,7 +87,7 @@ pub struct ShellRun {
     /// The largest residual over the loads.
     pub residual: f64,
     /// State at the end.
-    pub last: State,
+    pub last: AssemblyState,
 }
 
 impl ShellRun {
@@ -104,7 +104,7 @@ impl ShellRun {
         let model = tube(shells)?;
         let device = device.map(|device| Arc::new(device.clone()) as Arc<dyn LinearDevice>);
         let mut solver = BackwardEuler::on(device, model.clone(), settings)?;
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         let (mut times, mut residual) = (Vec::with_capacity(steps), 0.0_f64);
         for _ in 0..before {
             solver.advance(&mut state)?;
@@ -167,7 +167,7 @@ pub fn measure_shells(progress: &mut dyn FnMut(Progress)) -> Result<ShellReport,
             };
             if let Some(gpu) = &gpu {
                 let model = tube(shells).map_err(SolveError::from)?;
-                off = off.max(difference(&gpu.last, &cpu.last, &State::at_rest(&model)));
+                off = off.max(difference(&gpu.last, &cpu.last, &AssemblyState::at_rest(&model)));
             }
             rows.push(("cpu", name, cpu));
             rows.extend(gpu.map(|gpu| ("gpu", name, gpu)));
@@ -184,8 +184,8 @@ pub fn measure_shells(progress: &mut dyn FnMut(Progress)) -> Result<ShellReport,
 }
 
 /// The largest distance between nodes of two states over the largest displacement.
-fn difference(one: &State, other: &State, rest: &State) -> f64 {
-    let largest = |to: &State| {
+fn difference(one: &AssemblyState, other: &AssemblyState, rest: &AssemblyState) -> f64 {
+    let largest = |to: &AssemblyState| {
         let apart = other.position.iter().zip(&to.position).map(|(a, b)| (a - b).norm());
         apart.fold(0.0, f64::max)
     };

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use pliant_mechanics::Model;
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::tensor::{Vector, dot};
-use pliant_sim::{Frame, Method, Part, Precision, Simulation, Steps, World};
+use pliant_sim::{Frame, Method, ParticipantSetup, Precision, Setup, Simulation, Steps};
 
 use crate::CaseError;
 
@@ -24,7 +24,7 @@ pub fn run(
     until: f64,
     look: impl FnMut(&Frame<'_>),
 ) -> Result<Simulation, CaseError> {
-    let mut part = Part::explicit(NAME, model.clone(), until)?;
+    let mut part = ParticipantSetup::explicit(NAME, model.clone(), until)?;
     if let Method::Explicit(settings) = &mut part.method {
         settings.precision = precision;
         settings.critical_step = f64::INFINITY;
@@ -32,7 +32,7 @@ pub fn run(
     // A time that is a whole number of steps except for round-off takes no further step.
     part.steps = Steps { step, number: (until / step - 1e-9).ceil() as u64, ends: None };
     let end = part.steps.end_of(part.steps.number);
-    let mut simulation = Simulation::new(World::new(vec![part]))?;
+    let mut simulation = Simulation::new(Setup::new(vec![part]))?;
     simulation.run(end, look)?;
     Ok(simulation)
 }
@@ -99,9 +99,9 @@ pub fn relax(model: &Model) -> Result<Equilibrium, CaseError> {
 /// Runs to the equilibrium at a time [s], to a relative residual; the residual of double precision if not
 /// given.
 pub(crate) fn relaxed(model: &Model, until: f64, tolerance: Option<f64>) -> Result<Simulation, CaseError> {
-    let mut part = Part::quasi_static(NAME, model.clone(), until, 1);
+    let mut part = ParticipantSetup::quasi_static(NAME, model.clone(), until, 1);
     part.method = Method::QuasiStatic { precision: Precision::Double, tolerance };
-    let mut simulation = Simulation::new(World::new(vec![part]))?;
+    let mut simulation = Simulation::new(Setup::new(vec![part]))?;
     simulation.run(until, |_| ())?;
     Ok(simulation)
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use pliant_geometry::{Mesh, Vector3};
-use pliant_implicit::{Assembly, Shell, State, StaticSettings, Statics};
+use pliant_implicit::{Assembly, AssemblyState, Shell, StaticSettings, Statics};
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::model::{Constraint, Motion};
@@ -166,6 +166,6 @@ impl Specimen {
     /// If the stiffness is singular.
     pub fn linear(&self, node: u32) -> Result<[f64; 6], CaseError> {
         let mut solver = Statics::new(self.model.clone(), StaticSettings::default())?;
-        Ok(solver.linear(&State::at_rest(&self.model), 1.0)?[node as usize])
+        Ok(solver.linear(&AssemblyState::at_rest(&self.model), 1.0)?[node as usize])
     }
 }

@@ -239,7 +239,7 @@ fn pressed_at_a_barrier(quarter: &Quarter, depths: &[f64], near_pole: f64) -> Ve
     };
     let settings = StaticSettings { iterations: 200, ..StaticSettings::default() };
     let mut solver = Statics::new(model.clone(), settings).unwrap();
-    let mut state = pliant_implicit::State::at_rest(&model);
+    let mut state = pliant_implicit::AssemblyState::at_rest(&model);
     let (mut all, mut iterations, mut before) = (Vec::new(), 0, 0.0);
     for (depth, time) in depths.iter().zip(1..) {
         let parts = ((depth - before) / 1e-4).round();

@@ -4,7 +4,7 @@
 use pliant_explicit::{Scalar, State};
 use pliant_geometry::{CellBlock, Mesh, Vector3};
 use pliant_mechanics::model::Material;
-use pliant_mechanics::prony::{Part, Prony, PronyTerm, PronyUpdate};
+use pliant_mechanics::prony::{Prony, PronyPart, PronyTerm, PronyUpdate};
 use pliant_mechanics::tensor::Vector;
 use pliant_meshing::{Block, DEFAULT_CELL_LIMIT, Resolution, VolumeCell};
 use pliant_validation::{Specimen, claim, liver, run, smooth_step};
@@ -34,9 +34,9 @@ fn tets_beside_hexes() -> Mesh {
 fn specimen() -> Specimen {
     let term = |part, weight, time| PronyTerm { part, weight, time };
     let terms = [
-        term(Part::Isochoric, 0.3, 0.58),
-        term(Part::Isochoric, 0.2, 0.05),
-        term(Part::Volumetric, 0.1, 0.2),
+        term(PronyPart::Isochoric, 0.3, 0.58),
+        term(PronyPart::Isochoric, 0.2, 0.05),
+        term(PronyPart::Volumetric, 0.1, 0.2),
     ];
     let material =
         Material { law: liver(), prony: Prony::new(&terms, PronyUpdate::Exact).unwrap(), density: 1060.0 };

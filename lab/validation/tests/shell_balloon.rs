@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
-use pliant_implicit::{Control, State, StaticSettings, Statics};
+use pliant_implicit::{AssemblyState, Control, StaticSettings, Statics};
 use pliant_mechanics::load::{LoadKind, Spread};
 use pliant_shells::element::{Formulation, Membrane};
 use pliant_validation::claim;
@@ -61,7 +61,7 @@ fn blown_up(cuts: usize, membrane: Membrane, parts: u32) -> [f64; 4] {
     balloon.model.model_mut().loads[0].controlled = true;
     let model = &balloon.model;
     let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
-    let mut state = State::at_rest(model);
+    let mut state = AssemblyState::at_rest(model);
     state.time = 1.0;
     let rest = model.rest_volume(&cells);
     for part in 1..=parts {

@@ -5,7 +5,7 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use pliant_geometry::Mesh;
-use pliant_implicit::{Control, State, StaticSettings, Statics, Step};
+use pliant_implicit::{AssemblyState, Control, StaticSettings, Statics, Step};
 use pliant_linear::LinearSolver;
 use pliant_mechanics::load::LoadKind;
 use pliant_meshing::{DEFAULT_CELL_LIMIT, Pattern, Sheet};
@@ -29,11 +29,11 @@ fn follow(
     specimen: &Specimen,
     rows: &[Vec<f64>],
     linear: LinearSolver,
-    look: impl Fn(&State) -> [f64; 2],
+    look: impl Fn(&AssemblyState) -> [f64; 2],
 ) -> ([f64; 2], [f64; 2]) {
     let mut solver =
         Statics::new(specimen.model.clone(), StaticSettings { linear, ..StaticSettings::default() }).unwrap();
-    let mut state = State::at_rest(&specimen.model);
+    let mut state = AssemblyState::at_rest(&specimen.model);
     let mut off = [0.0_f64; 2];
     let largest = [1, 2].map(|c| rows.iter().map(|row| row[c].abs()).fold(0.0, f64::max));
     for row in rows {
@@ -201,7 +201,7 @@ fn hinged_roof(cells: usize) -> Vec<[f64; 3]> {
     let mut roof = roof.pull(centre, [-3000.0 / 4.0, 0.0, 0.0]);
     roof.model.model_mut().loads[0].controlled = true;
     let mut solver = Statics::new(roof.model.clone(), StaticSettings::default()).unwrap();
-    let mut state = State::at_rest(&roof.model);
+    let mut state = AssemblyState::at_rest(&roof.model);
     state.time = 1.0;
     let mut curve = Vec::new();
     for row in table("hinged_roof_h12.7") {

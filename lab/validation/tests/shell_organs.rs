@@ -13,7 +13,7 @@ use pliant_contact::touch::{Contact, Contacts, Touch, With};
 use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3, io};
 use pliant_implicit::AssemblySolver;
 use pliant_implicit::{
-    Assembly, BackwardEuler, ContactModel, DynamicSettings, Shell, State, StaticSettings, Statics,
+    Assembly, AssemblyState, BackwardEuler, ContactModel, DynamicSettings, Shell, StaticSettings, Statics,
 };
 use pliant_linear::{LinearSolver, Preconditioner};
 use pliant_mechanics::curve::{Curve, Shape};
@@ -142,11 +142,11 @@ impl Organ {
     }
 
     /// The equilibrium at full pressure, in five load steps.
-    fn equilibrium(&self, mesh: &Mesh) -> Result<(Assembly, State), String> {
+    fn equilibrium(&self, mesh: &Mesh) -> Result<(Assembly, AssemblyState), String> {
         let model = self.model(mesh);
         let start = Instant::now();
         let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         let cells: Vec<u32> = (0..model.facets.len() as u32).collect();
         let rest = model.rest_volume(&cells);
         let (steps, mut parts, mut iterations) = (5, 0, 0);
@@ -182,7 +182,7 @@ impl Organ {
     }
 
     /// One second of motion in steps of 10 ms, the pressure full after 0.5 s, mass-damped.
-    fn motion(&self, mesh: &Mesh) -> (Assembly, State) {
+    fn motion(&self, mesh: &Mesh) -> (Assembly, AssemblyState) {
         let mut model = self.model(mesh);
         model.model_mut().loads[0].curve = Curve { shape: Shape::SmoothStep, from: 0.0, to: 0.5 };
         model.model_mut().bodies[0].damping = 20.0;
@@ -194,7 +194,7 @@ impl Organ {
         let mut solver =
             BackwardEuler::new(model.clone(), DynamicSettings { linear, ..DynamicSettings::new(0.01) })
                 .unwrap();
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         let start = Instant::now();
         let (mut newton, mut parts, mut residual) = (0, 0, 0.0_f64);
         for _ in 0..100 {
@@ -214,13 +214,17 @@ impl Organ {
     }
 }
 
-fn largest(model: &Assembly, state: &State) -> f64 {
+fn largest(model: &Assembly, state: &AssemblyState) -> f64 {
     (0..model.rest.len()).map(|n| state.displacement(model, n).norm()).fold(0.0, f64::max)
 }
 
 /// The largest difference of displacements over the largest displacement; `map` leads from a node of the
 /// first to the same node of the second.
-fn apart(one: &(Assembly, State), other: &(Assembly, State), map: impl Fn(usize) -> usize) -> f64 {
+fn apart(
+    one: &(Assembly, AssemblyState),
+    other: &(Assembly, AssemblyState),
+    map: impl Fn(usize) -> usize,
+) -> f64 {
     let differences = (0..one.0.rest.len())
         .map(|n| (one.1.displacement(&one.0, n) - other.1.displacement(&other.0, map(n))).norm());
     differences.fold(0.0, f64::max) / largest(&one.0, &one.1)
@@ -286,7 +290,7 @@ fn table(path: PathBuf) -> Vec<(f64, f64)> {
 const EDGE: f64 = 4e-3;
 
 /// The distance [m] of a node from the nearest facet of another leaflet, if it is below a limit.
-fn gap(model: &Assembly, state: &State, leaflet: &[usize], node: usize, limit: f64) -> f64 {
+fn gap(model: &Assembly, state: &AssemblyState, leaflet: &[usize], node: usize, limit: f64) -> f64 {
     let mut least = limit;
     let q = state.position[node];
     for facet in model.facets.iter().filter(|facet| leaflet[facet.nodes[0] as usize] != leaflet[node]) {
@@ -384,7 +388,7 @@ fn valve_leaflets_close() {
         let Valve { model, leaflet, held, notes, .. } = valve(&folder, fine);
         let count = held.len();
         let mut solver = BackwardEuler::new(model.clone(), DynamicSettings::new(step)).unwrap();
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         let start = Instant::now();
         // Leaflets that hang side by side on the wall are close from the start.
         let apart = |n: &usize| gap(&model, &state, &leaflet, *n, 2e-3) >= 2e-3;
@@ -425,7 +429,7 @@ fn valve_leaflets_close() {
 /// The part of a grid of lines along the axis of the valve that no leaflet blocks. The grid lies within four
 /// fifths of the radius of the wall. A leaflet has the thickness `apart` [m], the distance that two leaflets
 /// keep.
-fn leak(valve: &Valve, state: &State, apart: f64) -> f64 {
+fn leak(valve: &Valve, state: &AssemblyState, apart: f64) -> f64 {
     let wall: Vec<Vector3> = valve.held.iter().map(|&n| state.position[n as usize]).collect();
     let centre = wall.iter().sum::<Vector3>() / wall.len() as f64;
     let spread: nalgebra::Matrix3<f64> = wall.iter().map(|p| (p - centre) * (p - centre).transpose()).sum();
@@ -499,7 +503,7 @@ fn valve_leaflets_coapt_and_hold_their_pressure() {
     });
     let settings = DynamicSettings { iterations: 200, ..DynamicSettings::new(2e-3) };
     let mut solver = BackwardEuler::new(valve.model.clone(), settings).unwrap();
-    let mut state = State::at_rest(&valve.model);
+    let mut state = AssemblyState::at_rest(&valve.model);
     let start = Instant::now();
     let (mut iterations, mut told) = (0, 0.0);
     let opened = leak(&valve, &state, LEAFLET + barrier);

@@ -5,7 +5,7 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use pliant_geometry::{Mesh, Vector3};
-use pliant_implicit::{Assembly, ExplicitShells, State, StaticSettings, Statics, Step};
+use pliant_implicit::{Assembly, AssemblyState, ExplicitShells, StaticSettings, Statics, Step};
 use pliant_mechanics::load::{LoadKind, Spread};
 use pliant_meshing::{DEFAULT_CELL_LIMIT, Pattern, Sheet, sphere};
 use pliant_shells::element::{Bending, Formulation, Membrane};
@@ -82,7 +82,7 @@ fn pressed(mesh: Mesh, whole: bool, thickness: f64, formulation: Formulation, sp
 /// Radial displacement of each node by linear theory over Lamé's.
 fn ratios(cylinder: &Specimen) -> Vec<f64> {
     let mut solver = Statics::new(cylinder.model.clone(), StaticSettings::default()).unwrap();
-    let moved = solver.linear(&State::at_rest(&cylinder.model), 1.0).unwrap();
+    let moved = solver.linear(&AssemblyState::at_rest(&cylinder.model), 1.0).unwrap();
     let radial = |(u, x): (&[f64; 6], Vector3)| (u[0] * x.x + u[1] * x.y) / 1e-6;
     moved.iter().zip(cylinder.model.places()).map(radial).collect()
 }
@@ -188,12 +188,12 @@ fn a_tube_widens_as_its_ends_allow() {
         }
         let exact = part * pressure * radius * radius / (young * thickness);
         let mut solver = Statics::new(tube.model.clone(), StaticSettings::default()).unwrap();
-        let moved = solver.linear(&State::at_rest(&tube.model), 1.0).unwrap();
+        let moved = solver.linear(&AssemblyState::at_rest(&tube.model), 1.0).unwrap();
         let radial = |(u, x): (&[f64; 6], Vector3)| (u[0] * x.x + u[1] * x.y) / radius / exact;
         let found: Vec<f64> = moved.iter().zip(tube.model.places()).map(radial).collect();
         claim(&format!("tube with {ends} ends: widening"), off(&found), 0.03);
         // A thousandth of the load is nearly linear.
-        let mut state = State::at_rest(&tube.model);
+        let mut state = AssemblyState::at_rest(&tube.model);
         solver.solve(&mut state, 1e-3).unwrap();
         let around = |facet: usize| {
             let own = state.resultants(&tube.model, facet).unwrap();
@@ -252,7 +252,7 @@ fn blown_up(mut model: Assembly, times: f64, strain: f64) -> (Vec<f64>, Step) {
         panic!("no pressure")
     };
     *pressure *= times;
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     let step =
         Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
     let ratio = |(x, rest): (&Vector3, Vector3)| (x - rest).xy().dot(&rest.xy()) / strain;
@@ -321,7 +321,7 @@ fn spheres_under_pressure() {
                 spread: DEFAULT.1,
             });
             let mut solver = Statics::new(ball.model.clone(), StaticSettings::default()).unwrap();
-            let moved = solver.linear(&State::at_rest(&ball.model), 1.0).unwrap();
+            let moved = solver.linear(&AssemblyState::at_rest(&ball.model), 1.0).unwrap();
             let places =
                 moved.iter().zip(ball.model.places()).map(|(u, x)| x + Vector3::new(u[0], u[1], u[2]));
             let places: Vec<Vector3> = places.collect();
@@ -353,7 +353,7 @@ fn an_explicit_cylinder_comes_to_rest_in_equilibrium() {
     model.model_mut().bodies[0].damping = damping;
     let step = 0.9 * ExplicitShells::stable_step(model);
     let mut solver = ExplicitShells::new(model.clone(), step).unwrap();
-    let mut state = State::at_rest(model);
+    let mut state = AssemblyState::at_rest(model);
     let steps = (40.0 / damping / step) as usize;
     for _ in 0..steps {
         solver.advance(&mut state).unwrap();

@@ -81,7 +81,7 @@ impl Running {
     }
 
     pub(crate) fn nodes(&self) -> usize {
-        self.simulation.world().parts.iter().map(|part| part.model.node_count()).sum()
+        self.simulation.setup().parts.iter().map(|part| part.model.node_count()).sum()
     }
 }
 

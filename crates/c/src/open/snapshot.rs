@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use pliant_sim::{State, World};
+use pliant_sim::{Setup, SimulationState};
 
-/// A state, and the world that it is of.
+/// A state, and the setup that it is of.
 pub(crate) struct OpenSnapshot {
-    pub(crate) world: Arc<World>,
-    pub(crate) state: State,
+    pub(crate) setup: Arc<Setup>,
+    pub(crate) state: SimulationState,
 }

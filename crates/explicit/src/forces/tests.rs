@@ -6,7 +6,7 @@ use pliant_mechanics::law::plane_stress::InPlane;
 use pliant_mechanics::law::samples::{every_law, law};
 use pliant_mechanics::law::{AnyLaw, Deformation, NeoHookean, Split, TransverselyIsotropic, Volumetric};
 use pliant_mechanics::model::{Averaging, Body, CellBlock, Cells, LocalNodes, Material};
-use pliant_mechanics::prony::{Part, Prony, PronyTerm, PronyUpdate};
+use pliant_mechanics::prony::{Prony, PronyPart, PronyTerm, PronyUpdate};
 use pliant_mechanics::tensor::scale as times;
 use pliant_mechanics::tensor::{Tensor, cross, dot, scale, sub};
 use pliant_testing::Random;
@@ -641,8 +641,11 @@ fn every_kernel() -> impl Iterator<Item = Model> {
     let any = ["tet4", "hex8", "growing-hex8", "membrane"];
     models.filter(move |(e, law)| any.contains(e) || law.has_volumetric_energy()).flat_map(
         |(element, law)| {
-            let terms =
-                [Part::Isochoric, Part::Volumetric].map(|part| PronyTerm { part, weight: 0.4, time: 0.3 });
+            let terms = [PronyPart::Isochoric, PronyPart::Volumetric].map(|part| PronyTerm {
+                part,
+                weight: 0.4,
+                time: 0.3,
+            });
             [vec![], terms.to_vec()].map(|terms| {
                 let mut model = distorted_cube(element, law);
                 model.solids[0].material.prony = Prony::new(&terms, PronyUpdate::Exact).unwrap();

@@ -10,7 +10,9 @@ use pliant_contact::touch::{Contact, Contacts, Touch, With};
 use pliant_geometry::Mesh;
 use pliant_gpu::Device;
 use pliant_implicit::AssemblySolver;
-use pliant_implicit::{Assembly, BackwardEuler, ContactModel, DynamicSettings, Shell, SolveError, State};
+use pliant_implicit::{
+    Assembly, AssemblyState, BackwardEuler, ContactModel, DynamicSettings, Shell, SolveError,
+};
 use pliant_linear::{
     BlockPattern, BlockValues, DeviceSolver, LinearDevice, LinearSolver, PassEnd, Preconditioner,
 };
@@ -69,9 +71,9 @@ fn run(
     model: &Assembly,
     settings: DynamicSettings,
     steps: usize,
-) -> (State, f64, usize, usize) {
+) -> (AssemblyState, f64, usize, usize) {
     let mut solver = BackwardEuler::on(device, model.clone(), settings).unwrap();
-    let (mut state, mut residual) = (State::at_rest(model), 0.0_f64);
+    let (mut state, mut residual) = (AssemblyState::at_rest(model), 0.0_f64);
     for _ in 0..steps {
         residual = residual.max(solver.advance(&mut state).unwrap().linear.residual);
     }
@@ -80,11 +82,11 @@ fn run(
 }
 
 /// The largest distance between nodes over the largest displacement.
-fn off(model: &Assembly, one: &State, other: &State) -> f64 {
-    let largest = |a: &State, b: &State| {
+fn off(model: &Assembly, one: &AssemblyState, other: &AssemblyState) -> f64 {
+    let largest = |a: &AssemblyState, b: &AssemblyState| {
         a.position.iter().zip(&b.position).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
     };
-    largest(one, other) / largest(other, &State::at_rest(model))
+    largest(one, other) / largest(other, &AssemblyState::at_rest(model))
 }
 
 const BOTH: [Preconditioner; 2] = [Preconditioner::BlockJacobi, Preconditioner::Aggregates];
@@ -252,7 +254,7 @@ fn contact_that_comes_and_goes_compiles_no_kernel() {
     let linear = gradients(1e-6, Preconditioner::Aggregates);
     let settings = DynamicSettings { linear, ..DynamicSettings::new(STEP) };
     let mut solver = BackwardEuler::on(on(&device), model.clone(), settings).unwrap();
-    let (mut state, mut patterns) = (State::at_rest(&model), Vec::new());
+    let (mut state, mut patterns) = (AssemblyState::at_rest(&model), Vec::new());
     let before = device.kernels();
     for _ in 0..8 {
         solver.advance(&mut state).unwrap();
@@ -375,7 +377,7 @@ fn iterations_that_run_out_are_told_with_their_residual() {
     };
     let settings = DynamicSettings { halvings: 0, ..DynamicSettings::new(STEP).real_time(linear) };
     let mut solver = BackwardEuler::on(on(&device), model.clone(), settings).unwrap();
-    match solver.advance(&mut State::at_rest(&model)) {
+    match solver.advance(&mut AssemblyState::at_rest(&model)) {
         Err(SolveError::Stalled { iterations: 5, residual }) => assert!(residual > 1e-6),
         other => panic!("{other:?}"),
     }
@@ -390,7 +392,7 @@ fn a_device_that_is_lost_ends_the_step_with_its_name_and_a_remedy() {
     let model = tube(12, 20);
     let settings = DynamicSettings::new(STEP).real_time(gradients(1e-3, Preconditioner::Aggregates));
     let mut solver = BackwardEuler::on(on(&device), model.clone(), settings).unwrap();
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     solver.advance(&mut state).unwrap();
     let before = state.clone();
     device.wgpu().0.destroy();

@@ -6,7 +6,7 @@ use std::time::Instant;
 use nalgebra::{UnitQuaternion, Vector3};
 use pliant_geometry::Mesh;
 use pliant_gpu::{Device, GpuError, GpuShells};
-use pliant_implicit::{Assembly, ExplicitShells, Spring, State};
+use pliant_implicit::{Assembly, AssemblyState, ExplicitShells, Spring};
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Load, LoadKind, Spread};
 use pliant_mechanics::model::{Constraint, Motion};
@@ -79,7 +79,7 @@ fn plate() -> Assembly {
 }
 
 /// A wavy patch with nodes at random, free but for a corner, flying and spinning.
-fn patch() -> (Assembly, State) {
+fn patch() -> (Assembly, AssemblyState) {
     let mut random = Random::new(7);
     let mut mesh = support::triangles(Sheet::Plate { size: [0.1, 0.09] }, [10, 9], Pattern::UnionJack);
     for x in &mut mesh.points {
@@ -90,7 +90,7 @@ fn patch() -> (Assembly, State) {
     model.model_mut().fix("corner", vec![0]);
     model.model_mut().constraints[0].components = [true, true, true, false, false, false];
     press(&mut model, 30.0, Spread::Curved);
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     let spin = Vector3::new(3.0, -2.0, 4.0);
     let about = model.place(0);
     for node in 0..model.rest.len() {
@@ -106,9 +106,9 @@ fn patch() -> (Assembly, State) {
 fn both(
     device: &Device,
     model: &Assembly,
-    (start, pushed): (&State, &[(u32, [f64; 3])]),
+    (start, pushed): (&AssemblyState, &[(u32, [f64; 3])]),
     parts: &[u64],
-) -> ([State; 2], [f64; 2]) {
+) -> ([AssemblyState; 2], [f64; 2]) {
     let step = step(model);
     let mut held = vec![false; 6 * model.rest.len()];
     for constraint in &model.constraints {
@@ -116,7 +116,7 @@ fn both(
             (0..6).for_each(|c| held[6 * node as usize + c] |= constraint.components[c]);
         }
     }
-    let power = |solver: &ExplicitShells, state: &State| -> f64 {
+    let power = |solver: &ExplicitShells, state: &AssemblyState| -> f64 {
         let forces = solver.forces();
         let rate =
             |i: usize| if i % 6 < 3 { state.velocity[i / 6][i % 6] } else { state.spin[i / 6][i % 6 - 3] };
@@ -132,7 +132,7 @@ fn both(
         let before = exact.clone();
         solver.go(&mut exact);
         // Forces before and after, over the way of the step between.
-        let moved = State { velocity: exact.velocity.clone(), spin: exact.spin.clone(), ..before };
+        let moved = AssemblyState { velocity: exact.velocity.clone(), spin: exact.spin.clone(), ..before };
         work[1] += 0.5 * step * power(&solver, &moved);
         solver.evaluate(&exact).unwrap();
         work[1] += 0.5 * step * power(&solver, &exact);
@@ -151,7 +151,7 @@ fn both(
 }
 
 /// The largest differences of places and of rotations, over the largest displacement and rotation.
-fn off(model: &Assembly, [one, other]: &[State; 2]) -> [f64; 2] {
+fn off(model: &Assembly, [one, other]: &[AssemblyState; 2]) -> [f64; 2] {
     let nodes = 0..model.rest.len();
     let largest = |of: &dyn Fn(usize) -> f64| nodes.clone().map(of).fold(0.0, f64::max);
     let angle = |q: &UnitQuaternion<f64>| 2.0 * q.imag().norm();
@@ -170,7 +170,7 @@ fn shells_move_as_on_the_cpu() {
     let Some(device) = support::device() else { return };
     let (patch, flying) = patch();
     let [tube, plate] = [tube([24, 16]), plate()];
-    let starts = [&tube, &plate].map(|model| State::at_rest(model));
+    let starts = [&tube, &plate].map(|model| AssemblyState::at_rest(model));
     // The middle of each is pushed, too.
     let pushed = [(60, [0.0, 1e-3, 0.0]), (61, [0.0, 0.0, 1e-3])];
     for (name, model, start) in
@@ -215,7 +215,7 @@ fn the_device_gives_the_same_bits_however_steps_are_divided() {
     let Some(device) = support::device() else { return };
     let model = tube([24, 16]);
     let run = |parts: &[u64]| {
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         let mut shells = GpuShells::new(&device, model.clone(), step(&model)).unwrap();
         for &part in parts {
             shells.advance(&mut state, part).unwrap();
@@ -234,7 +234,7 @@ fn another_stepper_goes_on_from_a_state_that_was_read_back() {
     let Some(device) = support::device() else { return };
     let model = tube([24, 16]);
     let new = || GpuShells::new(&device, model.clone(), step(&model)).unwrap();
-    let [mut whole, mut cut] = [State::at_rest(&model), State::at_rest(&model)];
+    let [mut whole, mut cut] = [AssemblyState::at_rest(&model), AssemblyState::at_rest(&model)];
     new().advance(&mut whole, 100).unwrap();
     new().advance(&mut cut, 60).unwrap();
     new().advance(&mut cut, 40).unwrap();
@@ -249,12 +249,12 @@ fn a_facet_that_is_broken_stops_the_device_at_its_instant() {
     let mut model = plate();
     add(&mut model, LoadKind::force([84], [0.0, 0.0, 500.0]), Shape::Hold);
     let mut solver = ExplicitShells::new(model.clone(), step(&model)).unwrap();
-    let mut exact = State::at_rest(&model);
+    let mut exact = AssemblyState::at_rest(&model);
     let mut steps = 0;
     while solver.advance(&mut exact).is_ok() {
         steps += 1;
     }
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     let moved =
         GpuShells::new(&device, model.clone(), step(&model)).unwrap().advance(&mut state, 5000).unwrap();
     assert!(moved.broken && moved.steps == steps && state.time == exact.time, "{moved:?} {steps}");
@@ -291,7 +291,7 @@ fn a_device_that_is_lost_ends_the_step_with_its_name() {
     let Some(device) = support::device() else { return };
     let model = plate();
     let mut shells = GpuShells::new(&device, model.clone(), step(&model)).unwrap();
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     shells.advance(&mut state, 3).unwrap();
     device.wgpu().0.destroy();
     match shells.advance(&mut state, 3) {
@@ -312,7 +312,7 @@ fn time_of_a_step() {
         let steps = (2_000_000 / facets as u64).clamp(40, 2000);
         let mut solver = ExplicitShells::new(model.clone(), step).unwrap();
         let mut shells = GpuShells::new(&device, model.clone(), step).unwrap();
-        let [mut cpu, mut gpu] = [State::at_rest(&model), State::at_rest(&model)];
+        let [mut cpu, mut gpu] = [AssemblyState::at_rest(&model), AssemblyState::at_rest(&model)];
         let per = |begun: Instant| begun.elapsed().as_secs_f64() * 1e9 / (steps as f64 * facets as f64);
         solver.advance(&mut cpu).unwrap();
         shells.advance(&mut gpu, 20).unwrap();

@@ -12,13 +12,13 @@ use rstar::{AABB, PointDistance, RTree, RTreeObject};
 
 use crate::curved::surface::CurvedSurface;
 use crate::model::assembly::Assembly;
-use crate::model::state::State;
+use crate::model::state::AssemblyState;
 
 /// A search tree over the curved surface where it was when the tree was made.
 struct Nearest<'s> {
     surface: &'s CurvedSurface,
     model: &'s Assembly,
-    state: &'s State,
+    state: &'s AssemblyState,
     tree: RTree<Flat>,
     /// No point of a patch is farther than this from its flat facet [m].
     bulge: f64,
@@ -47,7 +47,7 @@ impl PointDistance for Flat {
 }
 
 impl<'s> Nearest<'s> {
-    fn new(surface: &'s CurvedSurface, model: &'s Assembly, state: &'s State, cells: &[u32]) -> Self {
+    fn new(surface: &'s CurvedSurface, model: &'s Assembly, state: &'s AssemblyState, cells: &[u32]) -> Self {
         let flat = |&facet: &u32| {
             let nodes = model.facets[facet as usize].nodes;
             Flat { facet, corners: nodes.map(|node| state.position[node as usize]) }
@@ -84,7 +84,7 @@ impl CurvedSurface {
     pub fn carry_all(
         &self,
         model: &Assembly,
-        state: &State,
+        state: &AssemblyState,
         cells: &[u32],
         points: &[Vector3<f64>],
     ) -> Option<Vec<Carried>> {
@@ -97,7 +97,7 @@ impl CurvedSurface {
     pub fn carried_all(
         &self,
         model: &Assembly,
-        state: &State,
+        state: &AssemblyState,
         points: &[Carried],
         positions: &mut [Vector3<f64>],
     ) {
@@ -128,7 +128,7 @@ mod tests {
         for shape in [ball(2), cube(), strip()] {
             let model = model(shape, 0.01);
             let surface = CurvedSurface::new(&model, EdgeRule::Arc);
-            let mut state = State::at_rest(&model);
+            let mut state = AssemblyState::at_rest(&model);
             let shake: Vec<f64> = (0..6 * model.rest.len()).map(|_| 0.1 * random.number()).collect();
             state.advance(&shake, 1.0);
             let picture = surface.picture(&model, 24);
@@ -158,7 +158,7 @@ mod tests {
     fn feet_lie_on_borders_and_are_found_from_afar() {
         let model = model(strip(), 0.01);
         let surface = CurvedSurface::new(&model, EdgeRule::Arc);
-        let state = State::at_rest(&model);
+        let state = AssemblyState::at_rest(&model);
         let point = Vector3::new(6.3, -0.5, 0.2);
         for start in 0..32 {
             let carried = surface.carry(&model, &state, point, start);
@@ -173,7 +173,10 @@ mod tests {
     fn nothing_carries_without_facets() {
         let model = model(strip(), 0.01);
         let surface = CurvedSurface::new(&model, EdgeRule::Arc);
-        assert_eq!(surface.carry_all(&model, &State::at_rest(&model), &[], &[Vector3::zeros()]), None);
+        assert_eq!(
+            surface.carry_all(&model, &AssemblyState::at_rest(&model), &[], &[Vector3::zeros()]),
+            None
+        );
     }
 
     /// Forces on points off a shaken ball: the same work for any motion, force and moment in all to 1e-11.
@@ -182,7 +185,7 @@ mod tests {
         let mut random = Random::new(4);
         let model = model(ball(2), 0.01);
         let surface = CurvedSurface::new(&model, EdgeRule::Arc);
-        let rest = State::at_rest(&model);
+        let rest = AssemblyState::at_rest(&model);
         let points: Vec<_> = (0..50).map(|_| vector(&mut random).normalize() * 1.2).collect();
         let cells: Vec<u32> = (0..128).collect();
         let carried = surface.carry_all(&model, &rest, &cells, &points).unwrap();

@@ -6,9 +6,9 @@ use pliant_shells::Carried;
 
 use crate::curved::surface::CurvedSurface;
 use crate::model::assembly::Assembly;
-use crate::model::state::State;
+use crate::model::state::AssemblyState;
 
-impl Configuration for State {
+impl Configuration for AssemblyState {
     fn position(&self, node: u32) -> [f64; 3] {
         self.position[node as usize].into()
     }
@@ -37,15 +37,15 @@ impl<'a> CarriedPoints<'a> {
     }
 }
 
-impl Mapping<State> for CarriedPoints<'_> {
-    fn position(&self, state: &State, point: usize) -> [f64; 3] {
+impl Mapping<AssemblyState> for CarriedPoints<'_> {
+    fn position(&self, state: &AssemblyState, point: usize) -> [f64; 3] {
         match self {
             Self::Solid(weights) => weights.position(state, point),
             Self::Shell(assembly, curved, points) => curved.carried(assembly, state, &points[point]).into(),
         }
     }
 
-    fn velocity(&self, state: &State, point: usize) -> [f64; 3] {
+    fn velocity(&self, state: &AssemblyState, point: usize) -> [f64; 3] {
         match self {
             Self::Solid(weights) => weights.velocity(state, point),
             Self::Shell(assembly, curved, points) => {
@@ -65,7 +65,7 @@ impl Mapping<State> for CarriedPoints<'_> {
 
     fn add_force(
         &self,
-        state: &State,
+        state: &AssemblyState,
         point: usize,
         force: [f64; 3],
         add: &mut dyn FnMut(u32, [f64; 3], [f64; 3]),
@@ -102,7 +102,7 @@ mod tests {
         for shape in [ball(2), cube(), strip()] {
             let mut assembly = model(shape, 0.01);
             let curved = CurvedSurface::new(&assembly, EdgeRule::Arc);
-            let mut state = State::at_rest(&assembly);
+            let mut state = AssemblyState::at_rest(&assembly);
             let points: Vec<Vector3<f64>> = (0..40).map(|_| Vector3::from(random.vector()) * 2.0).collect();
             let facets: Vec<u32> = (0..assembly.facets.len() as u32).collect();
             let carried = curved.carry_all(&assembly, &state, &facets, &points).unwrap();

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use crate::curved::surface::CurvedSurface;
 use crate::model::assembly::Assembly;
-use crate::model::state::State;
+use crate::model::state::AssemblyState;
 
 /// Points and triangles that show the surface.
 #[derive(Clone, Debug, PartialEq)]
@@ -112,7 +112,7 @@ impl CurvedSurface {
                 row = above;
             }
         }
-        let state = State::at_rest(model);
+        let state = AssemblyState::at_rest(model);
         let point = |place: &Place| self.patch(model, &state, place.facet).point(place.weights);
         let rest = places.par_iter().with_min_len(64).map(point).collect();
         Picture { places, triangles, facet_edges, rest, per_facet }
@@ -132,7 +132,13 @@ impl Picture {
 
 impl PictureFields {
     /// Fills the arrays for a state, points side by side.
-    pub fn fill(&mut self, picture: &Picture, surface: &CurvedSurface, model: &Assembly, state: &State) {
+    pub fn fill(
+        &mut self,
+        picture: &Picture,
+        surface: &CurvedSurface,
+        model: &Assembly,
+        state: &AssemblyState,
+    ) {
         let count = picture.places.len();
         for vectors in [&mut self.position, &mut self.displacement, &mut self.rotation, &mut self.normal] {
             vectors.resize(count, Vector3::zeros());
@@ -178,9 +184,9 @@ mod tests {
     use pliant_shells::EdgeRule;
     use pliant_testing::Random;
 
-    fn shaken(model: &Assembly, size: f64, seed: u64) -> State {
+    fn shaken(model: &Assembly, size: f64, seed: u64) -> AssemblyState {
         let mut random = Random::new(seed);
-        let mut state = State::at_rest(model);
+        let mut state = AssemblyState::at_rest(model);
         let shake: Vec<f64> = (0..6 * model.rest.len()).map(|_| size * random.number()).collect();
         state.advance(&shake, 1.0);
         state
@@ -292,7 +298,7 @@ mod tests {
         let model = model(ball(2), 0.01);
         let surface = CurvedSurface::new(&model, EdgeRule::Arc);
         let picture = surface.picture(&model, 3);
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         let mut fields = PictureFields::default();
         fields.fill(&picture, &surface, &model, &state);
         assert!(fields.displacement.iter().chain(&fields.rotation).all(|d| *d == Vector3::zeros()));
@@ -318,7 +324,7 @@ mod tests {
         let surface = CurvedSurface::new(&model, EdgeRule::Arc);
         let picture = surface.picture(&model, 4);
         let mut fields = PictureFields::default();
-        fields.fill(&picture, &surface, &model, &State::at_rest(&model));
+        fields.fill(&picture, &surface, &model, &AssemblyState::at_rest(&model));
         let off = fields.normal.iter().zip(&fields.position).map(|(n, x)| n.angle(x)).fold(0.0, f64::max);
         println!("shading normals off by {:.2}°", off.to_degrees());
         assert!(off < 1_f64.to_radians(), "{off}");

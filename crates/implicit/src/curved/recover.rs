@@ -15,9 +15,9 @@ use rayon::prelude::*;
 
 use crate::model::assembly::Assembly;
 use crate::model::error::SolveError;
-use crate::model::state::State;
+use crate::model::state::AssemblyState;
 
-impl State {
+impl AssemblyState {
     /// Displacement of a node [m].
     pub fn displacement(&self, model: &Assembly, node: usize) -> Vector3<f64> {
         self.position[node] - model.place(node)
@@ -91,7 +91,7 @@ impl ShellFields {
     ///
     /// # Errors
     /// If a facet is collapsed or folded over: the first one. The arrays then are partly of before.
-    pub fn fill(&mut self, model: &Assembly, state: &State) -> Result<(), SolveError> {
+    pub fn fill(&mut self, model: &Assembly, state: &AssemblyState) -> Result<(), SolveError> {
         let count = model.facets.len();
         for tensors in [&mut self.membrane, &mut self.moment].into_iter().chain(&mut self.stress) {
             tensors.resize(count, Matrix3::zeros());
@@ -166,7 +166,7 @@ mod tests {
     const POISSON: f64 = MATERIAL.elastic.poisson;
 
     /// Returns a copy of a state with positions and rotations turned by a radian about a skew axis.
-    fn turned(state: &State) -> (State, Matrix3<f64>) {
+    fn turned(state: &AssemblyState) -> (AssemblyState, Matrix3<f64>) {
         let turn = exponential(&Vector3::new(1.0, -2.0, 0.5).normalize());
         let mut state = state.clone();
         state.position.iter_mut().for_each(|x| *x = turn * *x);
@@ -180,7 +180,7 @@ mod tests {
     fn a_plate_under_a_uniform_moment() {
         let model = model(strip(), 0.1);
         let k = 1e-7;
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         for ((x, r), rest) in state.position.iter_mut().zip(&mut state.rotation).zip(model.places()) {
             x.z = 0.5 * k * rest.x * rest.x;
             *r = exponential(&Vector3::new(0.0, -k * rest.x, 0.0));
@@ -210,7 +210,7 @@ mod tests {
     fn a_strip_in_tension_turned_by_a_radian() {
         let model = model(strip(), 0.1);
         let strain = 0.01;
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         for x in &mut state.position {
             *x = Vector3::new(x.x * (1.0 + strain), x.y * (1.0 - POISSON * strain), 0.0);
         }
@@ -239,7 +239,7 @@ mod tests {
         let scatter = [2, 3].map(|cuts| {
             let mut model = balloon(cuts, pressure);
             model.model_mut().loads[0].controlled = false;
-            let mut state = State::at_rest(&model);
+            let mut state = AssemblyState::at_rest(&model);
             Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
             let mut fields = ShellFields::default();
             fields.fill(&model, &state).unwrap();
@@ -297,7 +297,7 @@ mod tests {
         ] {
             model.model_mut().loads.push(Load::new("load", kind, curve.clone()));
         }
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
         let mut fields = ShellFields::default();
         fields.fill(&model, &state).unwrap();
@@ -322,7 +322,7 @@ mod tests {
     #[test]
     fn the_first_broken_cell_is_told() {
         let model = model(strip(), 0.1);
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         for facet in &model.facets[17..] {
             facet.nodes.iter().for_each(|&node| state.position[node as usize] = Vector3::zeros());
         }

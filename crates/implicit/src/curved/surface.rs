@@ -7,7 +7,7 @@ use pliant_shells::{Carried, EdgeRule, Patch, Place};
 use pliant_shells::{sides, straight_edges};
 
 use crate::model::assembly::Assembly;
-use crate::model::state::State;
+use crate::model::state::AssemblyState;
 
 /// The curved surface of a model's shells.
 #[derive(Clone, Debug)]
@@ -34,7 +34,7 @@ impl CurvedSurface {
     }
 
     /// The patch over a facet.
-    pub fn patch(&self, model: &Assembly, state: &State, facet: u32) -> Patch {
+    pub fn patch(&self, model: &Assembly, state: &AssemblyState, facet: u32) -> Patch {
         let facet = facet as usize;
         let p = model.facets[facet].nodes.map(|node| state.position[node as usize]);
         let n = model.corner_normals[facet].map(|normal| state.normal(model, normal as usize));
@@ -44,7 +44,7 @@ impl CurvedSurface {
     /// The foot of a point on the surface at a state, found from a facet near it. The search starts at the
     /// nearest place of that facet's patch. It moves to neighbours across the edges on which the place lies,
     /// as long as their places are nearer.
-    pub fn project(&self, model: &Assembly, state: &State, point: Vector3<f64>, facet: u32) -> Place {
+    pub fn project(&self, model: &Assembly, state: &AssemblyState, point: Vector3<f64>, facet: u32) -> Place {
         let nearest = |facet: u32| {
             let (weights, distance) = self.patch(model, state, facet).closest(&point, [1.0 / 3.0; 3]);
             (Place { facet, weights }, distance)
@@ -72,14 +72,14 @@ impl CurvedSurface {
     }
 
     /// A point of a visual mesh, bound to the surface where it now is; `facet` is one near it.
-    pub fn carry(&self, model: &Assembly, state: &State, point: Vector3<f64>, facet: u32) -> Carried {
+    pub fn carry(&self, model: &Assembly, state: &AssemblyState, point: Vector3<f64>, facet: u32) -> Carried {
         self.bind(model, state, &point, self.project(model, state, point, facet))
     }
 
     pub(crate) fn bind(
         &self,
         model: &Assembly,
-        state: &State,
+        state: &AssemblyState,
         point: &Vector3<f64>,
         place: Place,
     ) -> Carried {
@@ -90,7 +90,7 @@ impl CurvedSurface {
     }
 
     /// Position [m] of a carried point.
-    pub fn carried(&self, model: &Assembly, state: &State, point: &Carried) -> Vector3<f64> {
+    pub fn carried(&self, model: &Assembly, state: &AssemblyState, point: &Carried) -> Vector3<f64> {
         self.patch(model, state, point.place.facet).carried(point)
     }
 }

@@ -4,9 +4,9 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use pliant_mechanics::rotation::nearest_rotation;
 
 use crate::model::assembly::Assembly;
-use crate::model::state::State;
+use crate::model::state::AssemblyState;
 
-impl State {
+impl AssemblyState {
     /// Gives nodes the motion of a rigid body: a velocity [m/s] at a point [m] and a spin [rad/s].
     pub fn set_motion(
         &mut self,
@@ -66,7 +66,7 @@ mod tests {
         let model = model(ball(2), 0.02);
         let turn = exponential(&Vector3::new(1.0, -2.0, 1.5));
         let positions: Vec<_> = model.places().map(|x| turn * x + Vector3::x()).collect();
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         state.set_positions(&model, &positions);
         let energy = state.shell_energy(&model).unwrap();
         assert!(energy.membrane + energy.bending + energy.drilling.abs() < 1e-18, "{energy:?}");
@@ -79,7 +79,7 @@ mod tests {
     fn a_start_velocity_moves_a_free_body() {
         let model = model(ball(2), 0.02);
         let (velocity, spin) = (Vector3::new(1.0, -2.0, 0.5), Vector3::new(0.0, 0.0, 0.2));
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         let nodes: Vec<u32> = (0..model.rest.len() as u32).collect();
         state.set_motion(&nodes, velocity, spin, Vector3::zeros());
         let mut solver = BackwardEuler::new(model.clone(), DynamicSettings::new(0.02)).unwrap();
@@ -104,7 +104,7 @@ mod tests {
         end.components = [false, false, false, true, true, true];
         end.motion = Motion::turn([0.0; 3], vector.into(), 3, ramp());
         model.model_mut().constraints.push(end);
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
         for time in [0.3, 0.5, 1.0] {
             solver.solve(&mut state, time).unwrap();
@@ -113,7 +113,7 @@ mod tests {
                 assert!(state.rotation[node].angle_to(&wanted) < 1e-12, "{time}");
             }
         }
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         let mut solver = BackwardEuler::new(model.clone(), DynamicSettings::new(0.1)).unwrap();
         for _ in 0..7 {
             solver.advance(&mut state).unwrap();
@@ -132,7 +132,7 @@ mod tests {
         let surface = CurvedSurface::new(&model, EdgeRule::Arc);
         let above = model.place(17) + Vector3::new(0.0, 0.0, 2.0);
         let cells: Vec<u32> = (0..32).collect();
-        let points = surface.carry_all(&model, &State::at_rest(&model), &cells, &[above]).unwrap();
+        let points = surface.carry_all(&model, &AssemblyState::at_rest(&model), &cells, &[above]).unwrap();
         let force = Vector3::new(3.0, 0.5, 0.2);
         let skin =
             Surface { name: "skin".into(), body: 0, rest: vec![above.into()], mapping: Weights::default() };
@@ -140,7 +140,7 @@ mod tests {
         model.carried.insert(0, points.clone());
         let kind = LoadKind::force([0], force);
         model.model_mut().loads.push(Load { surface: Some(0), ..Load::new("pull", kind, ramp()) });
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         let step =
             Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
         println!("{} iterations", step.residuals.len());

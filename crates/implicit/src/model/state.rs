@@ -12,7 +12,7 @@ pub(crate) const NODES: usize = 1024;
 
 /// Current state of a model: positions, rotations, velocities and time.
 #[derive(Debug, Default, PartialEq)]
-pub struct State {
+pub struct AssemblyState {
     /// Time [s], or the curve parameter of a static load.
     pub time: f64,
     /// Factor of controlled loads.
@@ -29,7 +29,7 @@ pub struct State {
     pub history: History,
 }
 
-impl Clone for State {
+impl Clone for AssemblyState {
     fn clone(&self) -> Self {
         Self {
             time: self.time,
@@ -54,7 +54,7 @@ impl Clone for State {
     }
 }
 
-impl State {
+impl AssemblyState {
     /// At rest, where nothing is strained. To start elsewhere, change positions and rotations.
     pub fn at_rest(model: &Model) -> Self {
         let nodes = model.rest.len();

@@ -8,13 +8,13 @@ use pliant_mechanics::law::{AnyLaw, samples};
 use pliant_mechanics::load::{Load, LoadKind, NO_NODE};
 use pliant_mechanics::mapping::Weights;
 use pliant_mechanics::model::{Averaging, Cells, Constraint, Material, Motion, Solid, Surface};
-use pliant_mechanics::prony::{Part, Prony, PronyTerm, PronyUpdate};
+use pliant_mechanics::prony::{Prony, PronyPart, PronyTerm, PronyUpdate};
 use pliant_testing::Random;
 use serde_json::json;
 
 use crate::system::System;
 use crate::tests::bar;
-use crate::{Assembly, BackwardEuler, DynamicSettings, ModelError, State, StaticSettings, Statics};
+use crate::{Assembly, AssemblyState, BackwardEuler, DynamicSettings, ModelError, StaticSettings, Statics};
 
 const ELEMENTS: [&str; 5] = ["tet4", "tet4-anp", "hex8", "growing-hex8", "hex8-full"];
 
@@ -114,7 +114,7 @@ fn force_and_stiffness_are_derivatives() {
 }
 
 /// Central differences at a state: force from energy and stiffness from force to 1e-7 of their largest.
-fn assert_derivatives(what: &str, system: &mut System, state: &State) {
+fn assert_derivatives(what: &str, system: &mut System, state: &AssemblyState) {
     let nodes = state.position.len();
     let mut random = Random::new(5);
     let still = vec![0.0; 6 * nodes];
@@ -166,14 +166,14 @@ fn pressures_on_faces_have_their_stiffness() {
                 model
             }
         };
-        let stiffness = |model: &Assembly, state: &State| {
+        let stiffness = |model: &Assembly, state: &AssemblyState| {
             let mut system = System::new(model.clone().into(), LinearSolver::Direct).unwrap();
             let still = vec![0.0; 6 * model.rest.len()];
             system.evaluate(state, 1.0, Some(&still)).unwrap();
             system
         };
         let mut random = Random::new(3);
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         state.position.iter_mut().for_each(|x| *x += 0.01 * Vector3::from(random.vector()));
         let bare = stiffness(&model, &state);
         let kind = LoadKind::Pressure { faces, pressure: 1e5 };
@@ -226,7 +226,7 @@ fn loads_on_carried_surfaces_act_through_their_mapping() {
         let mapping = Weights::from_rows(rows);
         model.model_mut().surfaces.push(Surface { name: "top".into(), body: 0, rest: vec![], mapping });
         model.model_mut().loads.push(load);
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         let mut random = Random::new(3);
         state.position.iter_mut().for_each(|x| *x += 0.01 * Vector3::from(random.vector()));
         let mut system = System::new(model.clone().into(), LinearSolver::Direct).unwrap();
@@ -275,7 +275,7 @@ fn cantilever(element: &str, law: AnyLaw, force: f64, to: f64) -> Assembly {
 fn newtons_method_converges_quadratically() {
     for (element, name) in all() {
         let model = cantilever(element, law(name), 0.5, 1.0);
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         let settings = StaticSettings { tolerance: 1e-12, ..StaticSettings::default() };
         let step = Statics::new(model.clone(), settings).unwrap().solve(&mut state, 1.0).unwrap();
         let end = nodes_at(&model, 0.3)[0] as usize;
@@ -294,9 +294,9 @@ fn newtons_method_converges_quadratically() {
 /// A block whose law relaxes in both parts, or in the change of shape alone where pressures are averaged.
 fn relaxing(element: &str, update: PronyUpdate) -> Assembly {
     let mut model = block(element, law("neo-hookean"), [2, 1, 2], [0.2, 0.1, 0.2]);
-    let parts: &[Part] = match element {
-        "tet4" | "hex8" => &[Part::Isochoric, Part::Volumetric],
-        _ => &[Part::Isochoric],
+    let parts: &[PronyPart] = match element {
+        "tet4" | "hex8" => &[PronyPart::Isochoric, PronyPart::Volumetric],
+        _ => &[PronyPart::Isochoric],
     };
     let term = |&part| PronyTerm { part, weight: 0.6, time: 0.5 };
     let terms: Vec<PronyTerm> = parts.iter().map(term).collect();
@@ -305,9 +305,9 @@ fn relaxing(element: &str, update: PronyUpdate) -> Assembly {
 }
 
 /// A state of strains up to 20 %, turned far.
-fn strained(model: &Assembly, seed: u64) -> State {
+fn strained(model: &Assembly, seed: u64) -> AssemblyState {
     let mut random = Random::new(seed);
-    let mut state = State::at_rest(model);
+    let mut state = AssemblyState::at_rest(model);
     let turn = pliant_shells::rotation::exponential(&Vector3::new(1.0, -2.0, 0.5));
     for x in &mut state.position {
         *x = turn * (*x + 0.008 * Vector3::from(random.vector()));
@@ -325,10 +325,10 @@ fn relaxing_steps_have_their_energy_and_stiffness() {
         let mut system = System::new(model.clone().into(), LinearSolver::Direct).unwrap();
         let mut before = strained(&model, 1);
         system.begin_history(&mut before);
-        let mut state = State { history: before.history.clone(), ..strained(&model, 2) };
+        let mut state = AssemblyState { history: before.history.clone(), ..strained(&model, 2) };
         system.end_step(Some(&before), &mut state, 0.3);
         system.begin_step(&state.history, 0.2);
-        let next = State { history: state.history.clone(), ..strained(&model, 3) };
+        let next = AssemblyState { history: state.history.clone(), ..strained(&model, 3) };
         assert_derivatives(element, &mut system, &next);
     }
 }
@@ -382,7 +382,7 @@ fn steps_of_backward_euler_are_of_first_order() {
     for element in ELEMENTS {
         let model = cantilever(element, law("neo-hookean"), 1.0, 0.2);
         let at_end = |steps: u32| {
-            let mut state = State::at_rest(&model);
+            let mut state = AssemblyState::at_rest(&model);
             let settings =
                 DynamicSettings { tolerance: 1e-6, ..DynamicSettings::new(0.2 / f64::from(steps)) };
             let mut solver = BackwardEuler::new(model.clone(), settings).unwrap();
@@ -412,7 +412,7 @@ fn solids_without_stiffness_and_broken_ones_are_refused() {
     let wide = Cells::averaged_tet4(tets.clone(), &rest, Averaging::Variational);
     let refused = with(wide, Material::elastic(plain, 1000.0)).unwrap_err();
     assert!(refused.to_string().contains("`block`: `tet4-ianp` couples"), "{refused}");
-    let term = PronyTerm { part: Part::Volumetric, weight: 0.5, time: 1.0 };
+    let term = PronyTerm { part: PronyPart::Volumetric, weight: 0.5, time: 1.0 };
     let prony = Prony::new(&[term], PronyUpdate::Exact).unwrap();
     let relaxing = Material { prony, ..Material::elastic(plain, 1000.0) };
     let averaged = Cells::averaged_tet4(tets.clone(), &rest, Averaging::Nodal);
@@ -443,7 +443,7 @@ fn solids_without_stiffness_and_broken_ones_are_refused() {
 fn inverted_cells_are_reported() {
     for element in ELEMENTS {
         let model = block(element, law("neo-hookean"), [2, 1, 1], [0.2, 0.1, 0.1]);
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         // A corner that only the second half of the block has.
         let end = nodes_at(&model, 0.2);
         state.position[end[0] as usize].x -= 0.11;

@@ -18,7 +18,7 @@ use rayon::prelude::*;
 
 use crate::model::assembly::Assembly;
 use crate::model::error::SolveError;
-use crate::model::state::{NODES, State};
+use crate::model::state::{AssemblyState, NODES};
 use crate::steps::descent::{Contacting, Limits, Vectors, descend};
 use crate::steps::limits::within_limits;
 use crate::steps::solver::{AssemblySolver, Attempted};
@@ -116,10 +116,10 @@ pub struct BackwardEuler {
     solution: Vec<f64>,
     /// The product of the damping stiffness with the motion.
     product: Vec<f64>,
-    start: State,
+    start: AssemblyState,
     /// State a whole step before, for differences of second order. `None` after a start or a step that was
     /// halved.
-    previous: Option<Box<State>>,
+    previous: Option<Box<AssemblyState>>,
     differences: Differences,
     /// No step was taken so far: the state may be off the curves of prescribed components.
     fresh: bool,
@@ -145,7 +145,7 @@ impl Differences {
     }
 
     /// For a step [s] from a state on, with the state before where there is one.
-    fn set(&mut self, h: f64, start: &State, previous: Option<&State>) {
+    fn set(&mut self, h: f64, start: &AssemblyState, previous: Option<&AssemblyState>) {
         self.step = h;
         self.shift.clear();
         self.rate.clear();
@@ -168,7 +168,7 @@ impl Differences {
 struct Momentum<'a> {
     model: &'a Assembly,
     differences: &'a Differences,
-    start: &'a State,
+    start: &'a AssemblyState,
     moved: &'a [f64],
     damping: &'a [f64],
 }
@@ -224,7 +224,7 @@ impl BackwardEuler {
             residual: vec![0.0; free],
             solution: vec![0.0; free],
             product: vec![0.0; free],
-            start: State::at_rest(&model),
+            start: AssemblyState::at_rest(&model),
             previous: None,
             differences: Differences::default(),
             attempts: Vec::new(),
@@ -239,13 +239,13 @@ impl BackwardEuler {
     }
 
     /// State a step before, if the next step takes differences with it.
-    pub fn previous(&self) -> Option<&State> {
+    pub fn previous(&self) -> Option<&AssemblyState> {
         self.previous.as_deref()
     }
 
     /// Takes the state a step before from another solver, so that this solver continues where that one
     /// stopped.
-    pub fn go_on_from(&mut self, previous: Option<State>) {
+    pub fn go_on_from(&mut self, previous: Option<AssemblyState>) {
         self.previous = previous.map(Box::new);
     }
 
@@ -253,7 +253,7 @@ impl BackwardEuler {
     ///
     /// # Errors
     /// If it fails as often as it may be halved; the state then is at the last part of it that was made.
-    pub fn advance(&mut self, state: &mut State) -> Result<DynamicStep, SolveError> {
+    pub fn advance(&mut self, state: &mut AssemblyState) -> Result<DynamicStep, SolveError> {
         self.attempts.clear();
         let until = state.time + self.settings.step;
         let mut size = self.settings.step;
@@ -297,7 +297,7 @@ impl BackwardEuler {
     }
 
     /// Newton's method for a step of a length [s], kept with the other attempts.
-    fn newton(&mut self, state: &mut State, h: f64) -> Result<DynamicStep, SolveError> {
+    fn newton(&mut self, state: &mut AssemblyState, h: f64) -> Result<DynamicStep, SolveError> {
         let time = state.time + h;
         let allowed = self.settings.tolerance;
         self.attempts.push(Attempted { time, allowed, ..Attempted::default() });
@@ -326,7 +326,7 @@ impl BackwardEuler {
 
     /// [`newton`](Self::newton) without contact; whether the residual has come below the tolerance, or was
     /// not asked for.
-    fn newton_without_contact(&mut self, state: &mut State, h: f64) -> Result<bool, SolveError> {
+    fn newton_without_contact(&mut self, state: &mut AssemblyState, h: f64) -> Result<bool, SolveError> {
         let time = state.time + h;
         self.moved.fill(0.0);
         let mut converged = true;
@@ -385,7 +385,7 @@ impl BackwardEuler {
     }
 
     /// [`newton`](Self::newton) in contact, from the motion of before; the result as without.
-    fn newton_in_contact(&mut self, state: &mut State, h: f64) -> Result<bool, SolveError> {
+    fn newton_in_contact(&mut self, state: &mut AssemblyState, h: f64) -> Result<bool, SolveError> {
         let time = state.time + h;
         self.moved.fill(0.0);
         if !self.system.stiffness.damper.is_empty() {
@@ -425,7 +425,7 @@ impl BackwardEuler {
     }
 
     /// Ends a step: velocities and spins of the motion in it.
-    fn end(&mut self, state: &mut State, time: f64) {
+    fn end(&mut self, state: &mut AssemblyState, time: f64) {
         self.system.end_step(Some(&self.start), state, time - self.start.time);
         let Differences { step, shift, .. } = &self.differences;
         for (node, moved) in self.moved.chunks_exact(6).enumerate() {
@@ -453,7 +453,7 @@ impl BackwardEuler {
     }
 
     /// Translations and rotation vectors since the start of the step.
-    fn find_motion(&mut self, state: &State) {
+    fn find_motion(&mut self, state: &AssemblyState) {
         let Self { moved, start, .. } = self;
         moved.par_chunks_exact_mut(6).enumerate().with_min_len(NODES).for_each(|(node, moved)| {
             moved[..3].copy_from_slice((state.position[node] - start.position[node]).as_slice());
@@ -464,7 +464,7 @@ impl BackwardEuler {
 
     /// Finds loads less internal, inertial and damping forces on the free components. Returns the norm of
     /// this residual, and the largest norm among loads, internal and inertial forces.
-    fn find_residual(&mut self, state: &State) -> (f64, f64) {
+    fn find_residual(&mut self, state: &AssemblyState) -> (f64, f64) {
         let model = Arc::clone(&self.system.model);
         let Self { system, differences, start, moved, damping, .. } = self;
         let momentum = Momentum { model: &model, differences, start, moved, damping };
@@ -587,12 +587,12 @@ impl Contacting for BackwardEuler {
         Vectors { system, pending, increment, residual, solution }
     }
 
-    fn evaluate(&mut self, state: &State, time: f64, tangent: bool) -> Result<(), SolveError> {
+    fn evaluate(&mut self, state: &AssemblyState, time: f64, tangent: bool) -> Result<(), SolveError> {
         self.find_motion(state);
         self.system.evaluate(state, time, tangent.then_some(&self.pending[..]))
     }
 
-    fn find_residual(&mut self, state: &State) -> (f64, f64) {
+    fn find_residual(&mut self, state: &AssemblyState) -> (f64, f64) {
         let (norm, scale) = Self::find_residual(self, state);
         (norm, self.settings.tolerance * scale + self.round_off)
     }

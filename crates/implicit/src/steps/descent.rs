@@ -18,7 +18,7 @@
 use pliant_linear::dot;
 
 use crate::model::error::SolveError;
-use crate::model::state::State;
+use crate::model::state::AssemblyState;
 use crate::steps::solver::AssemblySolver;
 use crate::system::System;
 
@@ -48,10 +48,10 @@ pub(crate) trait Contacting: AssemblySolver {
     fn vectors(&mut self) -> Vectors<'_>;
 
     /// Finds forces, and the stiffness if it is wanted, at a state.
-    fn evaluate(&mut self, state: &State, time: f64, tangent: bool) -> Result<(), SolveError>;
+    fn evaluate(&mut self, state: &AssemblyState, time: f64, tangent: bool) -> Result<(), SolveError>;
 
     /// Finds the residual at the state last evaluated. Returns its norm and its tolerance.
-    fn find_residual(&mut self, state: &State) -> (f64, f64);
+    fn find_residual(&mut self, state: &AssemblyState) -> (f64, f64);
 
     /// The energy [J] of inertia and damping at the state last evaluated.
     fn potential(&mut self) -> f64;
@@ -96,7 +96,7 @@ pub(crate) struct Limits {
 
 /// Start of an iteration.
 struct Before {
-    state: State,
+    state: AssemblyState,
     time_fraction: f64,
     energy: f64,
     /// Sum of the sizes of the parts of the energy [J].
@@ -142,7 +142,7 @@ impl Aim {
 /// Residuals go to `found` with their tolerances.
 pub(crate) fn descend(
     solver: &mut impl Contacting,
-    state: &mut State,
+    state: &mut AssemblyState,
     time: f64,
     guess: Option<&[f64]>,
     limits: &Limits,
@@ -195,7 +195,7 @@ pub(crate) fn descend(
 }
 
 impl<'a> Descent<'a> {
-    fn new(limits: &'a Limits, time: f64, state: &State) -> Self {
+    fn new(limits: &'a Limits, time: f64, state: &AssemblyState) -> Self {
         let before = Before {
             state: state.clone(),
             time_fraction: 0.0,
@@ -218,7 +218,7 @@ impl<'a> Descent<'a> {
     fn aim(
         &mut self,
         solver: &mut impl Contacting,
-        state: &State,
+        state: &AssemblyState,
         iteration: usize,
         [complete, is_small]: [bool; 2],
     ) -> Result<Aim, SolveError> {
@@ -254,7 +254,7 @@ impl<'a> Descent<'a> {
     fn search(
         &self,
         solver: &mut impl Contacting,
-        state: &mut State,
+        state: &mut AssemblyState,
         aim: &Aim,
     ) -> Result<Option<bool>, SolveError> {
         let (before, time) = (&self.before, self.time);
@@ -301,7 +301,7 @@ impl<'a> Descent<'a> {
 
     /// Follows an increment that was made in full further, while the energy falls and nothing is in the way.
     /// It goes two, four and eight times as far.
-    fn expand(&mut self, solver: &mut impl Contacting, state: &mut State) -> Result<(), SolveError> {
+    fn expand(&mut self, solver: &mut impl Contacting, state: &mut AssemblyState) -> Result<(), SolveError> {
         let (before, time) = (&mut self.before, self.time);
         for doubling in 0..DOUBLINGS {
             before.state.clone_from(state);
@@ -333,7 +333,7 @@ impl<'a> Descent<'a> {
     fn end_uphill(
         &self,
         solver: &mut impl Contacting,
-        state: &mut State,
+        state: &mut AssemblyState,
         aim: &Aim,
         iterations: usize,
     ) -> Result<bool, SolveError> {
@@ -355,7 +355,7 @@ impl<'a> Descent<'a> {
 }
 
 /// Gives the contacts the step and the motion expected in it.
-fn begin(solver: &mut impl Contacting, state: &State, times: [f64; 2], guess: Option<&[f64]>) {
+fn begin(solver: &mut impl Contacting, state: &AssemblyState, times: [f64; 2], guess: Option<&[f64]>) {
     let Vectors { system, pending, increment, .. } = solver.vectors();
     match guess {
         Some(guess) => increment.copy_from_slice(guess),
@@ -378,7 +378,7 @@ fn begin(solver: &mut impl Contacting, state: &State, times: [f64; 2], guess: Op
 /// there.
 fn start_from(
     solver: &mut impl Contacting,
-    state: &mut State,
+    state: &mut AssemblyState,
     time: f64,
     guess: &[f64],
 ) -> Result<bool, SolveError> {

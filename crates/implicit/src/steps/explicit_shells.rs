@@ -8,7 +8,7 @@ use pliant_shells::rotation::exponential;
 
 use crate::model::assembly::Assembly;
 use crate::model::error::SolveError;
-use crate::model::state::State;
+use crate::model::state::AssemblyState;
 use crate::solid::highest_frequency_squared;
 use crate::steps::forces::Forces;
 use crate::system::Phases;
@@ -83,7 +83,7 @@ impl ExplicitShells {
     ///
     /// # Errors
     /// If an element collapses or folds over.
-    pub fn advance(&mut self, state: &mut State) -> Result<(), SolveError> {
+    pub fn advance(&mut self, state: &mut AssemblyState) -> Result<(), SolveError> {
         self.evaluate(state)?;
         self.go(state);
         Ok(())
@@ -93,7 +93,7 @@ impl ExplicitShells {
     ///
     /// # Errors
     /// If an element collapses or folds over.
-    pub fn evaluate(&mut self, state: &State) -> Result<(), SolveError> {
+    pub fn evaluate(&mut self, state: &AssemblyState) -> Result<(), SolveError> {
         self.forces.evaluate(state)
     }
 
@@ -113,7 +113,7 @@ impl ExplicitShells {
     }
 
     /// The second half of a step: moves the state on with the forces that were evaluated at it.
-    pub fn go(&mut self, state: &mut State) {
+    pub fn go(&mut self, state: &mut AssemblyState) {
         let (h, model) = (self.step, Arc::clone(&self.forces.system.model));
         if std::mem::take(&mut self.fresh) {
             self.forces.system.catch_up(state, state.time + h);

@@ -7,7 +7,7 @@ use pliant_mechanics::model::Enclosed;
 
 use crate::model::assembly::{Assembly, Spring};
 use crate::model::error::SolveError;
-use crate::model::state::State;
+use crate::model::state::AssemblyState;
 use crate::system::System;
 
 /// Forces and moments on the nodes of a model at the state last evaluated.
@@ -27,7 +27,7 @@ impl Forces {
     ///
     /// # Errors
     /// If an element collapses or folds over.
-    pub fn evaluate(&mut self, state: &State) -> Result<(), SolveError> {
+    pub fn evaluate(&mut self, state: &AssemblyState) -> Result<(), SolveError> {
         self.system.stand(&state.history);
         self.system.evaluate(state, state.time, None)?;
         let system = &mut self.system;
@@ -76,7 +76,11 @@ impl Forces {
     /// come the force [N] and moment [N m] of its pressure by components, six a node. `None` for other
     /// constraints. The pressure balances the resistance of its nodes by least squares, and is exact in
     /// equilibrium.
-    pub fn enclosed(&self, constraint: usize, state: &State) -> Option<(Enclosed, Vec<(usize, f64)>)> {
+    pub fn enclosed(
+        &self,
+        constraint: usize,
+        state: &AssemblyState,
+    ) -> Option<(Enclosed, Vec<(usize, f64)>)> {
         self.system.enclosed(constraint, state)
     }
 

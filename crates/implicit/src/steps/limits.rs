@@ -13,7 +13,7 @@ use pliant_contact::lag::Lag;
 
 use crate::model::assembly::Assembly;
 use crate::model::error::SolveError;
-use crate::model::state::State;
+use crate::model::state::AssemblyState;
 use crate::steps::descent::{Contacting, Vectors};
 use crate::system::System;
 
@@ -132,9 +132,9 @@ impl Valve {
 /// is; `solve` solves it from its start with these at their assumed places.
 pub(crate) fn within_limits<S: Contacting, T, E: From<SolveError>>(
     solver: &mut S,
-    state: &mut State,
+    state: &mut AssemblyState,
     time: f64,
-    mut solve: impl FnMut(&mut S, &mut State) -> Result<T, E>,
+    mut solve: impl FnMut(&mut S, &mut AssemblyState) -> Result<T, E>,
 ) -> Result<T, E> {
     let mut guesses = solver.system_mut().guesses();
     let mut valves = solver.system_mut().valves();

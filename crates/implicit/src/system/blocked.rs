@@ -5,12 +5,12 @@ use pliant_mechanics::model::{Constraint, Motion};
 
 use super::System;
 use crate::model::error::SolveError;
-use crate::model::state::State;
+use crate::model::state::AssemblyState;
 
 impl System {
     /// An error of a step that began at a state; where the step is blocked, with what drives it there, its
     /// force and the gap.
-    pub(crate) fn blocked_at(&mut self, state: &State, error: SolveError) -> SolveError {
+    pub(crate) fn blocked_at(&mut self, state: &AssemblyState, error: SolveError) -> SolveError {
         let SolveError::Blocked { time, part, iterations, .. } = error else { return error };
         self.stand(&state.history);
         if let Some(contact) = &mut self.contact {

@@ -15,7 +15,7 @@ use pliant_mechanics::model::{Constraint, Enclosure, Motion};
 
 use crate::Assembly;
 use crate::curved::surface::CurvedSurface;
-use crate::model::state::State;
+use crate::model::state::AssemblyState;
 
 /// A gap that counts as none, over the mean edge or over the volume.
 const CLOSED: f64 = 1e-10;
@@ -97,7 +97,7 @@ impl Conditions {
                 }
                 Motion::Volume { enclosure, .. } => {
                     let mut dense = vec![0.0; equations.count()];
-                    let rest = State::at_rest(model);
+                    let rest = AssemblyState::at_rest(model);
                     let volume =
                         add_gradient(model, surface, own, enclosure, &rest, &mut into(equations, &mut dense));
                     add(constraint, Kind::Volume(volume), dense, CLOSED * volume.abs());
@@ -167,7 +167,7 @@ impl Conditions {
         model: &Assembly,
         equations: &Equations,
         surface: Option<&CurvedSurface>,
-        state: &State,
+        state: &AssemblyState,
         time: f64,
     ) {
         for row in self.rows.iter_mut().chain(self.loose.iter_mut().map(|(row, _)| row)) {
@@ -315,7 +315,7 @@ pub(crate) fn add_gradient(
     surface: Option<&CurvedSurface>,
     own: &Constraint,
     enclosure: &Enclosure,
-    state: &State,
+    state: &AssemblyState,
     add: &mut dyn FnMut(usize, f64),
 ) -> f64 {
     let node = |at: u32| own.nodes[at as usize] as usize;

@@ -17,7 +17,7 @@ use pliant_linear::sparse::{Equations, LowerMatrix};
 use crate::model::assembly::Assembly;
 use crate::model::contact::ContactModel;
 use crate::model::error::SolveError;
-use crate::model::state::State;
+use crate::model::state::AssemblyState;
 use crate::system::followers::Followers;
 use crate::system::samples::{Movers, Samples, acts, movers_of};
 
@@ -49,7 +49,7 @@ pub fn apart_counts(contact: &ContactModel, model: &Assembly) -> Vec<usize> {
 }
 
 /// Whatever has no gap at a state: a run can't start there.
-pub fn meetings(contact: &ContactModel, model: &Assembly, state: &State) -> Vec<Meeting> {
+pub fn meetings(contact: &ContactModel, model: &Assembly, state: &AssemblyState) -> Vec<Meeting> {
     let (barriers, samples) = made(contact, model);
     let Some(mut samples) = samples else { return barriers.meetings(&state.position, state.time) };
     samples.place(model, state);
@@ -145,7 +145,7 @@ impl ContactSystem {
 
     /// Begins a step between two times [s] at a state, expected to go by a motion, six numbers a node.
     /// Friction is taken from the start.
-    pub(crate) fn begin(&mut self, state: &State, motion: &[f64], times: [f64; 2]) {
+    pub(crate) fn begin(&mut self, state: &AssemblyState, motion: &[f64], times: [f64; 2]) {
         let begun = Instant::now();
         match &mut self.samples {
             None => self.step.begin_next(&state.position, motion, times),
@@ -164,7 +164,7 @@ impl ContactSystem {
     /// are free of collisions, nothing has gone through anything.
     pub(crate) fn collision_free_fraction(
         &mut self,
-        state: &State,
+        state: &AssemblyState,
         increment: &[f64],
         keep_and_most: [f64; 2],
     ) -> f64 {
@@ -174,7 +174,7 @@ impl ContactSystem {
         part
     }
 
-    fn free_part(&mut self, state: &State, increment: &[f64], [keep, most]: [f64; 2]) -> f64 {
+    fn free_part(&mut self, state: &AssemblyState, increment: &[f64], [keep, most]: [f64; 2]) -> f64 {
         let Some((samples, _)) = &mut self.samples else {
             return self.step.collision_free_fraction(
                 &state.position,
@@ -211,7 +211,7 @@ impl ContactSystem {
     }
 
     /// Finds forces and energy at a state.
-    pub(crate) fn evaluate(&mut self, state: &State, followers: Option<&Followers>) {
+    pub(crate) fn evaluate(&mut self, state: &AssemblyState, followers: Option<&Followers>) {
         let begun = Instant::now();
         self.forces.fill(0.0);
         match &mut self.samples {
@@ -253,7 +253,7 @@ impl ContactSystem {
     }
 
     /// [`now`](Self::now) at a state that no step led to: without friction.
-    pub fn at(&mut self, state: &State) -> ContactNow {
+    pub fn at(&mut self, state: &AssemblyState) -> ContactNow {
         self.stand(state);
         self.evaluate(state, None);
         self.touches = self.touched();
@@ -261,7 +261,7 @@ impl ContactSystem {
     }
 
     /// Evaluates a state by itself from now on, without friction.
-    pub(crate) fn stand(&mut self, state: &State) {
+    pub(crate) fn stand(&mut self, state: &AssemblyState) {
         let still = vec![0.0; self.forces.len()];
         let shifts = self.lags.iter().map(|lag| (lag.number() as u32, [lag.now(); 2]));
         *self.step.shifts_mut() = shifts.collect();

@@ -18,7 +18,7 @@ use super::{FACETS, Sums};
 use crate::curved::surface::CurvedSurface;
 use crate::model::assembly::Assembly;
 use crate::model::error::SolveError;
-use crate::model::state::State;
+use crate::model::state::AssemblyState;
 
 /// Data of facets besides the model.
 pub(crate) struct Facets {
@@ -89,7 +89,7 @@ impl Facets {
     pub(super) fn add(
         &mut self,
         model: &Assembly,
-        state: &State,
+        state: &AssemblyState,
         moved: Option<&[f64]>,
         sums: &mut Sums<'_>,
     ) -> Result<(), SolveError> {
@@ -130,7 +130,7 @@ impl Facets {
 /// Inputs for the forces of facets.
 struct Finding<'a> {
     model: &'a Assembly,
-    state: &'a State,
+    state: &'a AssemblyState,
     wanted: Wanted,
     packs: &'a [FacetPack],
     arch: Arch,

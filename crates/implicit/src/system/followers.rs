@@ -16,7 +16,7 @@ use pliant_mechanics::tie::Tie;
 use pliant_shells::rotation::skew;
 
 use crate::Assembly;
-use crate::model::state::State;
+use crate::model::state::AssemblyState;
 use crate::system::turns::Turn;
 
 /// The nodes whose unknowns move a cell, and how many components of each.
@@ -329,7 +329,7 @@ impl Followers {
     }
 
     /// Puts the nodes that go with rigid parts where these are.
-    pub(crate) fn place(&self, model: &Assembly, state: &mut State) {
+    pub(crate) fn place(&self, model: &Assembly, state: &mut AssemblyState) {
         let moved = |followed: &Followed| {
             let node = followed.node as usize;
             followed.weight * (state.position[node] - model.place(node))
@@ -354,7 +354,7 @@ impl Followers {
     }
 
     /// Takes the arms at a state, and how nodes turn with solids.
-    pub(crate) fn turn(&mut self, state: &State) {
+    pub(crate) fn turn(&mut self, state: &AssemblyState) {
         self.turns.iter_mut().for_each(|turn| turn.turn(state));
         for followed in
             self.rows.iter_mut().flat_map(|(_, row)| row).filter(|followed| followed.part.is_some())
@@ -481,7 +481,7 @@ impl Followers {
 
 impl Assembly {
     /// Puts all nodes that follow others where these are at a state, and turns those that turn with a solid.
-    pub fn take_along(&self, state: &mut State) {
+    pub fn take_along(&self, state: &mut AssemblyState) {
         for (node, row) in self.ties.iter().flat_map(pliant_mechanics::tie::Tie::component_rows) {
             let moved = |followed: usize| state.position[followed] - self.place(followed);
             let along = row.map(|(followed, w)| moved(followed as usize).component_mul(&Vector3::from(w)));

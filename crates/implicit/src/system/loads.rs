@@ -14,12 +14,12 @@ use super::solids::{corners, press_face};
 use super::stiffness::Stiffness;
 use super::{Sums, System};
 use crate::curved::mapping::CarriedPoints;
-use crate::model::state::State;
+use crate::model::state::AssemblyState;
 use crate::system::conditions::add_gradient;
 
 impl System {
     /// Loads on nodes, and pressures on facets.
-    pub(super) fn find_loads(&mut self, state: &State, time: f64) {
+    pub(super) fn find_loads(&mut self, state: &AssemblyState, time: f64) {
         let Self { model, facets, forces, .. } = self;
         let Facets { surface, pressure: on_facets, .. } = facets;
         on_facets.fill(Pressure::default());
@@ -73,7 +73,7 @@ impl System {
     }
 
     /// Adds how the pressures in enclosures change with their nodes.
-    pub(super) fn press_enclosures(&mut self, state: &State, moved: &[f64]) {
+    pub(super) fn press_enclosures(&mut self, state: &AssemblyState, moved: &[f64]) {
         if self.conditions.is_empty() {
             return;
         }
@@ -113,7 +113,11 @@ impl System {
     /// The enclosed volume of a constraint of volume at the state last evaluated. With it come the pressure
     /// that balances the resistance of its nodes, and the forces of this pressure, component by component.
     /// `None` for other constraints.
-    pub(crate) fn enclosed(&self, constraint: usize, state: &State) -> Option<(Enclosed, Vec<(usize, f64)>)> {
+    pub(crate) fn enclosed(
+        &self,
+        constraint: usize,
+        state: &AssemblyState,
+    ) -> Option<(Enclosed, Vec<(usize, f64)>)> {
         let own = &self.model.constraints[constraint];
         let Motion::Volume { enclosure, .. } = &own.motion else { return None };
         let mut all: Vec<(usize, f64)> = Vec::new();

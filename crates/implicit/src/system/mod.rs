@@ -34,7 +34,7 @@ use self::solids::Solids;
 use self::stiffness::Stiffness;
 use crate::model::assembly::{Assembly, Spring};
 use crate::model::error::SolveError;
-use crate::model::state::State;
+use crate::model::state::AssemblyState;
 use crate::solid::relaxation::History;
 use crate::system::conditions::Conditions;
 use crate::system::contact::ContactSystem;
@@ -220,7 +220,7 @@ impl System {
     }
 
     /// Ends a step [s]: the history of a state is advanced from the state before, or from rest.
-    pub(crate) fn end_step(&mut self, before: Option<&State>, state: &mut State, step: f64) {
+    pub(crate) fn end_step(&mut self, before: Option<&AssemblyState>, state: &mut AssemblyState, step: f64) {
         if let Some(before) = before {
             let time = before.time + step;
             self.lags.iter_mut().for_each(|lag| lag.advance(time));
@@ -232,14 +232,14 @@ impl System {
             return;
         }
         let mut history = std::mem::take(&mut state.history);
-        let place = |state: &State, node: u32| self.model.displacement(&state.position, node);
+        let place = |state: &AssemblyState, node: u32| self.model.displacement(&state.position, node);
         let from = |node: u32| before.map_or([0.0; 3], |before| place(before, node));
         self.solids.relaxation.end(&self.model, from, |node| place(state, node), step, &mut history);
         state.history = history;
     }
 
     /// Begins the history of a state, if it has not begun: how it is strained loads the instantaneous laws.
-    pub(crate) fn begin_history(&mut self, state: &mut State) {
+    pub(crate) fn begin_history(&mut self, state: &mut AssemblyState) {
         if !state.history.begun {
             self.end_step(None, state, 0.0);
         }
@@ -249,7 +249,7 @@ impl System {
     /// prescribed increments (six a node).
     pub(crate) fn evaluate(
         &mut self,
-        state: &State,
+        state: &AssemblyState,
         time: f64,
         tangent: Option<&[f64]>,
     ) -> Result<(), SolveError> {
@@ -274,14 +274,14 @@ impl System {
     }
 
     /// Finds forces of contacts, and makes room for their stiffness if it is wanted.
-    fn find_contacts(&mut self, state: &State, tangent: bool) -> Result<(), SolveError> {
+    fn find_contacts(&mut self, state: &AssemblyState, tangent: bool) -> Result<(), SolveError> {
         let Some(contact) = &mut self.contact else { return Ok(()) };
         contact.evaluate(state, self.followers.as_ref());
         if tangent { self.make_room() } else { Ok(()) }
     }
 
     /// Takes what depends on the state alone, and begins sums with the loads.
-    fn begin_sums(&mut self, state: &State, time: f64, tangent: bool) {
+    fn begin_sums(&mut self, state: &AssemblyState, time: f64, tangent: bool) {
         if let Some(followers) = &mut self.followers {
             followers.turn(state);
         }
@@ -295,7 +295,12 @@ impl System {
     }
 
     /// Adds facets, solids and what presses on their faces.
-    fn add_cells(&mut self, state: &State, time: f64, tangent: Option<&[f64]>) -> Result<(), SolveError> {
+    fn add_cells(
+        &mut self,
+        state: &AssemblyState,
+        time: f64,
+        tangent: Option<&[f64]>,
+    ) -> Result<(), SolveError> {
         let Self { model, facets, solids, forces, stiffness, followers, .. } = self;
         let mut sums = Sums { forces, stiffness, followers: followers.as_ref() };
         // Within the threads' pool, so that no part waits for another thread to take it up.
@@ -308,7 +313,7 @@ impl System {
     }
 
     /// Adds springs, and forces that come and go.
-    fn add_springs(&mut self, state: &State, tangent: bool) {
+    fn add_springs(&mut self, state: &AssemblyState, tangent: bool) {
         let Self { model, forces, stiffness, followers, .. } = self;
         forces.add_springs(&model.springs, state);
         if tangent {
@@ -383,7 +388,7 @@ impl System {
 
     /// Brings prescribed components that are off their curves back to them between the time of a state and
     /// another one [s].
-    pub(crate) fn catch_up(&mut self, state: &State, until: f64) {
+    pub(crate) fn catch_up(&mut self, state: &AssemblyState, until: f64) {
         let lag = |number: usize| {
             let own = self.lags.iter().find(|lag| lag.number() == number);
             own.map_or_else(Vector3::zeros, Lag::now)
@@ -400,7 +405,7 @@ impl System {
     }
 
     /// Moves a state by a part of an increment, six components a node.
-    pub(crate) fn advance(&self, state: &mut State, increment: &[f64], part: f64) {
+    pub(crate) fn advance(&self, state: &mut AssemblyState, increment: &[f64], part: f64) {
         state.advance(increment, part);
         if let Some(followers) = &self.followers {
             followers.place(&self.model, state);

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::model::assembly::Spring;
-use crate::model::state::State;
+use crate::model::state::AssemblyState;
 
 /// Forces and moments at the state last evaluated, six a node [N, N m].
 pub(crate) struct NodalForces {
@@ -76,7 +76,7 @@ impl NodalForces {
     }
 
     /// Adds forces of springs of the model, of those that come and go, and what pushes.
-    pub(super) fn add_springs(&mut self, springs: &[Spring], state: &State) {
+    pub(super) fn add_springs(&mut self, springs: &[Spring], state: &AssemblyState) {
         let stretched = |spring: &Spring| state.position[spring.node as usize] - spring.anchor;
         for spring in springs {
             let (at, stretch) = (6 * spring.node as usize, stretched(spring));

@@ -9,7 +9,7 @@ use pliant_shells::rotation::{exponential, logarithm};
 
 use crate::curved::surface::CurvedSurface;
 use crate::model::assembly::Assembly;
-use crate::model::state::State;
+use crate::model::state::AssemblyState;
 use crate::system::conditions::add_gradient;
 
 /// A distance that counts as none, over the mean edge: what round-off adds up to over many steps.
@@ -27,7 +27,7 @@ impl Gap {
     /// The gap of a state that has come in by a time [s]; `None` if the state is where its curves say.
     pub(crate) fn of(
         model: &Assembly,
-        state: &State,
+        state: &AssemblyState,
         until: f64,
         lag: impl Fn(usize) -> Vector3<f64>,
     ) -> Option<Self> {
@@ -52,7 +52,7 @@ impl Assembly {
     /// Puts prescribed nodes, with all that follows them, where their motions are at the time of a state, at
     /// rest. A run in time begins so. Nodes with a prescribed mean shift together. Nodes around a prescribed
     /// volume move along its gradient; others stay.
-    pub fn place_prescribed(&self, state: &mut State) {
+    pub fn place_prescribed(&self, state: &mut AssemblyState) {
         let gap = missing(self, state, |_| Vector3::zeros());
         state.advance(&gap, 1.0);
         let held = self.held_components();
@@ -68,9 +68,16 @@ impl Assembly {
 
     /// Grows what a constraint encloses by a volume [m³] beyond that at rest: its free nodes move along the
     /// gradient of the volume.
-    fn fill(&self, own: &Constraint, enclosure: &Enclosure, growth: f64, held: &[bool], state: &mut State) {
+    fn fill(
+        &self,
+        own: &Constraint,
+        enclosure: &Enclosure,
+        growth: f64,
+        held: &[bool],
+        state: &mut AssemblyState,
+    ) {
         let surface = (!enclosure.facets.is_empty()).then(|| CurvedSurface::new(self, EdgeRule::Arc));
-        let volume = |state: &State, gradient: &mut [f64]| {
+        let volume = |state: &AssemblyState, gradient: &mut [f64]| {
             gradient.fill(0.0);
             add_gradient(self, surface.as_ref(), own, enclosure, state, &mut |at, value| {
                 if at % 6 < 3 && !held[at] {
@@ -79,8 +86,8 @@ impl Assembly {
             })
         };
         let mut gradient = vec![0.0; 6 * self.rest.len()];
-        let wanted = volume(&State::at_rest(self), &mut gradient) + growth;
-        fill(state, wanted, &mut gradient, volume, State::advance);
+        let wanted = volume(&AssemblyState::at_rest(self), &mut gradient) + growth;
+        fill(state, wanted, &mut gradient, volume, AssemblyState::advance);
     }
 
     /// Flags of the components that a constraint fixes or moves by itself, six a node.
@@ -100,7 +107,7 @@ impl Assembly {
 /// their curves at the time of a state. They lie on a straight way. `lag` is the way [m] by which the nodes
 /// of a constraint lag behind it. Nodes that are fixed stay where they start. Rotations about some axes only
 /// are not followed beyond rest.
-fn missing(model: &Assembly, state: &State, lag: impl Fn(usize) -> Vector3<f64>) -> Vec<f64> {
+fn missing(model: &Assembly, state: &AssemblyState, lag: impl Fn(usize) -> Vector3<f64>) -> Vec<f64> {
     let mut all = vec![0.0; 6 * model.rest.len()];
     for (number, own) in model.constraints.iter().enumerate() {
         if matches!(own.motion, Motion::Fixed) || own.motion.is_collective() {

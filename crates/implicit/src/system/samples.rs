@@ -14,7 +14,7 @@ use pliant_shells::{EdgeRule, Place};
 
 use crate::curved::surface::CurvedSurface;
 use crate::model::assembly::Assembly;
-use crate::model::state::State;
+use crate::model::state::AssemblyState;
 use crate::system::followers::Followers;
 
 /// J of a point: its velocity over the velocity and the spin of a node.
@@ -33,7 +33,7 @@ pub(crate) struct Samples {
     /// Motions of nodes and points, six numbers each, of which translations count.
     pub(crate) motion: Vec<f64>,
     /// A state that is tried.
-    tried: State,
+    tried: AssemblyState,
 }
 
 /// Numbers the points of facets as they are asked for.
@@ -139,7 +139,7 @@ impl Samples {
             contacts.contacts.iter().zip(levels).map(|(contact, &level)| of(contact, level, &mut divided));
         let sampled = Contacts { contacts: all.collect(), ..contacts.clone() };
         let points = numbers.points;
-        let state = State::at_rest(model);
+        let state = AssemblyState::at_rest(model);
         let mut own = Self {
             surface: CurvedSurface::new(model, EdgeRule::Arc),
             jacobians: vec![SMatrix::zeros(); points.len()],
@@ -154,7 +154,7 @@ impl Samples {
     }
 
     /// Finds places and J at a state.
-    pub(crate) fn place(&mut self, model: &Assembly, state: &State) {
+    pub(crate) fn place(&mut self, model: &Assembly, state: &AssemblyState) {
         self.places.clear();
         self.places.extend_from_slice(&state.position);
         let mut last = None;
@@ -196,7 +196,13 @@ impl Samples {
 
     /// Finds the motion of nodes and points along an increment, from a state with the places found last. The
     /// motion of a point is its way over a part of the increment, divided by that part.
-    pub(crate) fn move_along(&mut self, model: &Assembly, state: &State, increment: &[f64], part: f64) {
+    pub(crate) fn move_along(
+        &mut self,
+        model: &Assembly,
+        state: &AssemblyState,
+        increment: &[f64],
+        part: f64,
+    ) {
         self.tried.clone_from(state);
         self.tried.advance(increment, part);
         self.motion[..6 * self.nodes].copy_from_slice(increment);

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::{CHUNK, Sums};
 use crate::model::assembly::Assembly;
 use crate::model::error::SolveError;
-use crate::model::state::State;
+use crate::model::state::AssemblyState;
 use crate::solid::relaxation::Relaxation;
 use crate::solid::{Response, Stars};
 
@@ -59,7 +59,7 @@ impl Solids {
     pub(super) fn add(
         &mut self,
         model: &Assembly,
-        state: &State,
+        state: &AssemblyState,
         moved: Option<&[f64]>,
         sums: &mut Sums<'_>,
     ) -> Result<(), SolveError> {
@@ -81,7 +81,7 @@ impl Solids {
         &mut self,
         model: &Assembly,
         (index, solid): (usize, &Solid),
-        state: &State,
+        state: &AssemblyState,
         moved: Option<&[f64]>,
         sums: &mut Sums<'_>,
     ) -> Result<(), SolveError> {
@@ -127,7 +127,7 @@ impl Solids {
     pub(super) fn add_faces(
         &self,
         model: &Assembly,
-        state: &State,
+        state: &AssemblyState,
         time: f64,
         moved: &[f64],
         sums: &mut Sums<'_>,
@@ -146,7 +146,7 @@ pub(super) fn press_face(
     face: &Face,
     places: &[u32],
     pressure: f64,
-    state: &State,
+    state: &AssemblyState,
     moved: &[f64],
     sums: &mut Sums<'_>,
 ) {
@@ -172,7 +172,13 @@ pub(super) fn corners(face: &Face) -> &[u32] {
 /// The derivative of p ∫ N_a n dA of a face by the positions of its nodes, column by column. The pressure
 /// acts against the outward normal. If wanted, only its symmetric part. The derivative is made by
 /// differences, which are exact: the areas are of second order in each position.
-fn pressure_change(face: &Face, count: usize, state: &State, pressure: f64, symmetric: bool) -> Vec<f64> {
+fn pressure_change(
+    face: &Face,
+    count: usize,
+    state: &AssemblyState,
+    pressure: f64,
+    symmetric: bool,
+) -> Vec<f64> {
     let size = 3 * count;
     let mut tangent = vec![0.0; size * size];
     let place = |node: u32| -> [f64; 3] { state.position[node as usize].into() };

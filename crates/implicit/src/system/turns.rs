@@ -10,7 +10,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use pliant_mechanics::rotation::nearest_rotation;
 use pliant_shells::rotation::skew;
 
-use crate::model::state::State;
+use crate::model::state::AssemblyState;
 use crate::model::turns::CarriedTurn;
 
 /// A node that turns with a solid, with its J at a state.
@@ -38,18 +38,18 @@ impl Turn {
     }
 
     /// F at a state.
-    fn deformation(&self, state: &State) -> Matrix3<f64> {
+    fn deformation(&self, state: &AssemblyState) -> Matrix3<f64> {
         let part = |(node, g, _): &(u32, Vector3<f64>, _)| state.position[*node as usize] * g.transpose();
         self.rows.iter().map(part).sum()
     }
 
     /// The rotation at a state.
-    pub(crate) fn rotation(&self, state: &State) -> UnitQuaternion<f64> {
+    pub(crate) fn rotation(&self, state: &AssemblyState) -> UnitQuaternion<f64> {
         UnitQuaternion::from_rotation_matrix(&nearest_rotation(&self.deformation(state)))
     }
 
     /// Takes J at a state.
-    pub(crate) fn turn(&mut self, state: &State) {
+    pub(crate) fn turn(&mut self, state: &AssemblyState) {
         let f = self.deformation(state);
         let rotation = nearest_rotation(&f);
         let stretch = f * rotation.matrix().transpose();
@@ -115,14 +115,14 @@ mod tests {
     use pliant_testing::Random;
 
     /// A tet with a node inside, in large rotation and strain.
-    fn placed() -> (CarriedTurn, State) {
+    fn placed() -> (CarriedTurn, AssemblyState) {
         let rest = [[0.0; 3], [0.01, 0.001, 0.0], [0.002, 0.012, 0.001], [-0.001, 0.001, 0.009]];
         let model = Assembly::new("tet", rest.map(Vector3::from));
         let edges = Matrix3::from_columns(&[1, 2, 3].map(|k| model.place(k) - model.place(0)));
         let inverse = edges.try_inverse().unwrap();
         let mut gradient: Vec<_> = (0..3).map(|k| (k + 1, inverse.row(k as usize).transpose())).collect();
         gradient.insert(0, (0, -gradient.iter().map(|(_, g)| g).sum::<Vector3<f64>>()));
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         let turn = exponential(&Vector3::new(1.3, -1.9, 0.8));
         let mut random = Random::new(5);
         for position in &mut state.position {
@@ -131,7 +131,7 @@ mod tests {
         (CarriedTurn { node: 9, gradient }, state)
     }
 
-    fn moved(state: &State, way: &[Vector3<f64>], part: f64) -> State {
+    fn moved(state: &AssemblyState, way: &[Vector3<f64>], part: f64) -> AssemblyState {
         let mut moved = state.clone();
         moved.position.iter_mut().zip(way).for_each(|(x, way)| *x += way * part);
         moved
@@ -173,7 +173,7 @@ mod tests {
                 .into();
         for angle in [0.0, 1e-6, 1.0, 3.1] {
             let turn = exponential(&(Vector3::new(0.3, -0.8, 0.5).normalize() * angle));
-            let mut state = State::at_rest(&Assembly::new("tet", rest.clone()));
+            let mut state = AssemblyState::at_rest(&Assembly::new("tet", rest.clone()));
             state.position.iter_mut().for_each(|x| *x = turn * *x + Vector3::new(0.1, 0.2, -0.3));
             // Coordinates of 0.4 m have a relative accuracy of 2e-16, over 1 cm of the tet.
             assert!(Turn::new(&carried).rotation(&state).angle_to(&turn) < 1e-13);

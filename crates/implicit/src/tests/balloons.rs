@@ -18,7 +18,7 @@ pub(super) fn a_balloon_takes_the_volume_it_is_told() {
         let model = balloon(cuts, 1.0);
         let cells: Vec<u32> = (0..model.facets.len() as u32).collect();
         let rest = model.rest_volume(&cells);
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
         solver.control(&mut state, Control::Volume { volume: rest * growth.powi(3) }, 1.0).unwrap();
         let volume = model.enclosed_volume(&cells, &state.position);
@@ -46,7 +46,7 @@ pub(super) fn a_balloon_doubles_its_volume() {
         model.facets = shell.facets;
         let cells: Vec<u32> = (0..model.facets.len() as u32).collect();
         let rest = model.rest_volume(&cells);
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
         for part in 1..=10 {
             let volume = rest * (1.0 + 0.1 * f64::from(part));
@@ -77,7 +77,7 @@ pub(super) fn pressure_on_the_curved_surface_acts_on_its_area() {
         let cells = upper.collect();
         model.model_mut().loads[0].kind = LoadKind::ShellPressure { facets: cells, pressure: 1.0, spread };
         let mut system = System::new(model.clone().into(), LinearSolver::Direct).unwrap();
-        system.evaluate(&State::at_rest(&model), 0.0, None).unwrap();
+        system.evaluate(&AssemblyState::at_rest(&model), 0.0, None).unwrap();
         (0..3).map(|c| system.forces.controlled.iter().skip(c).step_by(6).sum()).collect::<Vec<f64>>()
     };
     let (flat, curved) = (half(&model, Spread::Lumped), half(&model, Spread::Curved));
@@ -129,7 +129,7 @@ pub(super) fn sphere_of_320(formulation: Formulation, spread: Spread) -> Assembl
     model
 }
 
-pub(super) fn radii(state: &State) -> [f64; 2] {
+pub(super) fn radii(state: &AssemblyState) -> [f64; 2] {
     let centre = state.position.iter().sum::<Vector3<f64>>() / state.position.len() as f64;
     let radii = state.position.iter().map(|x| (x - centre).norm());
     [radii.clone().fold(f64::INFINITY, f64::min), radii.fold(0.0, f64::max)]
@@ -143,7 +143,7 @@ pub(super) fn blown_up(
 ) -> Result<(Step, [f64; 2]), SolveError> {
     let model = sphere_of_320(formulation, spread);
     let settings = StaticSettings { linear, halvings: 0, ..StaticSettings::default() };
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     let step = Statics::new(model.clone(), settings)?.solve(&mut state, 1.0)?;
     Ok((step, radii(&state)))
 }
@@ -180,7 +180,7 @@ pub(super) fn a_balloon_must_be_closed() {
     model.model_mut().loads[0].kind =
         LoadKind::ShellPressure { facets: cells, pressure: 1.0, spread: Spread::Lumped };
     let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     let error = solver.control(&mut state, Control::Volume { volume: 5.0 }, 1.0).unwrap_err();
     assert!(error.to_string().contains("1 open border: 3 nodes"), "{error}");
 }
@@ -192,7 +192,7 @@ pub(super) fn a_balloon_must_be_closed() {
 pub(super) fn hencky_slack_membrane_under_pressure() {
     let off = [8, 16, 32].map(|cells| {
         let (model, middle) = round_membrane(cells);
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
         let step = solver.solve(&mut state, 1.0).unwrap();
         let ratio = state.position[middle].z / (0.653 * 1e-3_f64.cbrt());
@@ -212,7 +212,7 @@ pub(super) fn hencky_slack_membrane_under_pressure() {
     for linear in [LinearSolver::Direct, gradients] {
         let settings = StaticSettings { linear, ..StaticSettings::default() };
         let mut solver = Statics::new(model.clone(), settings).unwrap();
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         for time in [0.25, 0.5, 0.75, 1.0] {
             assert_eq!(solver.solve(&mut state, time).unwrap().parts, 1);
         }
@@ -279,7 +279,7 @@ pub(super) fn a_taut_membrane_rises_as_by_poisson() {
         let all = (0..model.facets.len() as u32).collect();
         let kind = LoadKind::ShellPressure { facets: all, pressure, spread: Spread::Lumped };
         model.model_mut().loads.push(Load::new("pressure", kind, ramp()));
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
         let ratio = state.position[(row * row / 2) as usize].z / (0.073671 * pressure / tension);
         println!("{membrane:?}: rise over Poisson's {ratio:.4}");

@@ -2,7 +2,7 @@
 
 use super::cantilever;
 use crate::model::error::SolveError;
-use crate::model::state::State;
+use crate::model::state::AssemblyState;
 use crate::steps::descent::{Contacting, Limits, Vectors, descend};
 use crate::system::System;
 use crate::{AssemblySolver, Attempted, StaticSettings, Statics};
@@ -38,11 +38,11 @@ impl Contacting for Stuck {
         self.solver.vectors()
     }
 
-    fn evaluate(&mut self, state: &State, time: f64, tangent: bool) -> Result<(), SolveError> {
+    fn evaluate(&mut self, state: &AssemblyState, time: f64, tangent: bool) -> Result<(), SolveError> {
         Contacting::evaluate(&mut self.solver, state, time, tangent)
     }
 
-    fn find_residual(&mut self, state: &State) -> (f64, f64) {
+    fn find_residual(&mut self, state: &AssemblyState) -> (f64, f64) {
         Contacting::find_residual(&mut self.solver, state)
     }
 
@@ -75,9 +75,9 @@ fn a_descent_that_fails_is_accepted_if_told_so() {
     let descent = |accept: bool| {
         let solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
         let limits = Limits { iterations: 30, lags: 0, close: None, accept, farthest: f64::INFINITY };
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         let found = descend(&mut Stuck { solver, asked: 0 }, &mut state, 1.0, None, &limits, &mut |_, _| ());
-        (found, state.position == State::at_rest(&model).position)
+        (found, state.position == AssemblyState::at_rest(&model).position)
     };
     let (accepted, stays) = descent(true);
     assert_eq!((accepted.ok(), stays), (Some(false), true));

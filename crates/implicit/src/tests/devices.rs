@@ -12,7 +12,7 @@ use pliant_mechanics::load::{Load, LoadKind};
 use pliant_shells::element::{Elasticity, Wall};
 
 use crate::AssemblySolver;
-use crate::{Assembly, BackwardEuler, DynamicSettings, Phases, Shell, SolveError, State};
+use crate::{Assembly, AssemblyState, BackwardEuler, DynamicSettings, Phases, Shell, SolveError};
 
 /// Faults of a broken device.
 #[derive(Clone, Copy, Debug)]
@@ -63,7 +63,7 @@ impl DeviceSolver for Fault {
 }
 
 /// A strip that falls for a step.
-fn fall(device: Option<Fault>) -> Result<(State, Phases), SolveError> {
+fn fall(device: Option<Fault>) -> Result<(AssemblyState, Phases), SolveError> {
     let points = (0..42).map(|i| Vector3::new(f64::from(i / 2) * 0.1, f64::from(i % 2) * 0.1, 0.0));
     let cells =
         (0..20).flat_map(|i| [[2 * i, 2 * i + 2, 2 * i + 3], [2 * i, 2 * i + 3, 2 * i + 1]]).collect();
@@ -81,7 +81,7 @@ fn fall(device: Option<Fault>) -> Result<(State, Phases), SolveError> {
     let device = device.map(|fault| Arc::new(fault) as Arc<dyn LinearDevice>);
     let settings = DynamicSettings::new(0.01).real_time(linear);
     let mut solver = BackwardEuler::on(device, model.clone(), settings)?;
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     solver.advance(&mut state)?;
     Ok((state, solver.phases()))
 }

@@ -14,7 +14,7 @@ pub(super) fn iterative(preconditioner: Preconditioner) -> LinearSolver {
 #[test]
 pub(super) fn all_linear_solvers_find_the_same_equilibrium() {
     let model = cantilever();
-    let mut found: Vec<State> = Vec::new();
+    let mut found: Vec<AssemblyState> = Vec::new();
     for linear in [
         LinearSolver::Direct,
         LinearSolver::Unsymmetric,
@@ -22,7 +22,7 @@ pub(super) fn all_linear_solvers_find_the_same_equilibrium() {
         iterative(Preconditioner::Aggregates),
         iterative(Preconditioner::LaggedFactors { renew_after: 20 }),
     ] {
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         let mut solver =
             Statics::new(model.clone(), StaticSettings { linear, ..StaticSettings::default() }).unwrap();
         let step = solver.solve(&mut state, 1.0).unwrap();
@@ -45,7 +45,7 @@ pub(super) fn threads_change_no_bit() {
     let solve = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
-            let mut state = State::at_rest(&model);
+            let mut state = AssemblyState::at_rest(&model);
             Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
             state
         })
@@ -68,7 +68,7 @@ pub(super) fn threads_change_no_bit_of_sums_over_facets() {
         let solve = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| {
-                let mut state = State { load_factor: 1.0, ..State::at_rest(&model) };
+                let mut state = AssemblyState { load_factor: 1.0, ..AssemblyState::at_rest(&model) };
                 let settings = StaticSettings::default();
                 let step = Statics::new(model.clone(), settings).unwrap().solve(&mut state, 0.5);
                 (step.map(|step| step.residuals), state)
@@ -89,7 +89,7 @@ pub(super) fn threads_change_no_bit_of_conjugate_gradients() {
         let linear = LinearSolver::ConjugateGradients { tolerance: 1e-6, iterations: 5000, preconditioner };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
-            let mut state = State { load_factor: 1.0, ..State::at_rest(&model) };
+            let mut state = AssemblyState { load_factor: 1.0, ..AssemblyState::at_rest(&model) };
             let mut solver =
                 BackwardEuler::new(model.clone(), DynamicSettings::new(0.04).real_time(linear)).unwrap();
             for _ in 0..3 {
@@ -117,14 +117,14 @@ pub(super) fn iterations_that_run_out_are_taken_if_told_so() {
         preconditioner: Preconditioner::BlockJacobi,
     };
     let settings = DynamicSettings { halvings: 0, ..DynamicSettings::new(0.04).real_time(linear) };
-    let mut state = State { load_factor: 1.0, ..State::at_rest(&model) };
+    let mut state = AssemblyState { load_factor: 1.0, ..AssemblyState::at_rest(&model) };
     let error = BackwardEuler::new(model.clone(), settings).unwrap().advance(&mut state).unwrap_err();
     assert!(matches!(error, SolveError::Stalled { iterations: 4, .. }), "{error}");
     let settings = DynamicSettings { accept_stalled: true, ..settings };
     let step = BackwardEuler::new(model.clone(), settings).unwrap().advance(&mut state).unwrap();
     assert_eq!(step.linear.iterations, 4);
     assert!(step.linear.residual > 1e-9 && step.linear.residual < 1.0, "{:?}", step.linear);
-    assert_ne!(state, State::at_rest(&model));
+    assert_ne!(state, AssemblyState::at_rest(&model));
 }
 
 pub(super) fn gradients(preconditioner: Preconditioner) -> LinearSolver {
@@ -138,7 +138,7 @@ pub(super) fn conjugate_gradients_tell_why_they_stop() {
     let model = cantilever();
     let solve = |preconditioner, iterations, squeeze: f64| {
         let linear = LinearSolver::ConjugateGradients { tolerance: 1e-10, iterations, preconditioner };
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         state.position.iter_mut().for_each(|x| x.x *= squeeze);
         let settings = StaticSettings { linear, ..StaticSettings::default() };
         Statics::new(model.clone(), settings).unwrap().linear(&state, 1.0).map(|_| ())

@@ -52,7 +52,7 @@ pub(super) fn timoshenko_two_layer_strip_stretches_as_it_bends() {
     let rigidity =
         1e6 * (own + area * (0.025 + neutral).powi(2)) + 4e6 * (own + area * (0.025 - neutral).powi(2));
     let curvature = moment / rigidity;
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
     for node in [8, 17, 26] {
         let moved = state.displacement(&model, node);
@@ -105,7 +105,7 @@ pub(super) fn layers_pass_the_patch_test() {
     let (n, m) = stress(&strain, &curvature);
     for membrane in [Membrane::default(), Membrane::Cst { drilling: 0.01 }] {
         let model = layered((points.clone(), cells.clone()), &layers, membrane);
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         for ((x, r), rest) in state.position.iter_mut().zip(&mut state.rotation).zip(model.places()) {
             let (a, b) = (rest.x, rest.y);
             let [kx, ky, kxy] = curvature.into();
@@ -167,7 +167,7 @@ pub(super) fn navier_orthotropic_plate() {
         let kind = LoadKind::force([node], force);
         model.model_mut().loads.push(Load::new("pressure", kind, ramp()));
     }
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
     let part = 1.0 - 0.25 * 0.25 / 25.0;
     let [stiff, soft] = [25e6 / part, 1e6 / part];

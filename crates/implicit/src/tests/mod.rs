@@ -236,7 +236,7 @@ fn a_singular_stiffness_names_its_node() {
     model.add_shell(&Shell { formulation, ..Shell::new("skin", cells, 0.1, MATERIAL) }).unwrap();
     model.model_mut().constraints.push(fix(vec![0, 9, 18], [true; 6]));
     let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
-    let error = solver.linear(&State::at_rest(&model), 1.0).unwrap_err();
+    let error = solver.linear(&AssemblyState::at_rest(&model), 1.0).unwrap_err();
     assert!(matches!(error, SolveError::Singular { component: "rotation about z", .. }), "{error}");
 }
 
@@ -247,7 +247,7 @@ fn the_assembled_stiffness_is_the_derivative_of_the_forces() {
     let mut model = balloon(2, 100.0);
     model.springs.push(Spring { node: 5, anchor: Vector3::new(0.0, 0.0, -2.0), stiffness: 30.0 });
     let mut system = System::new(model.clone().into(), LinearSolver::Unsymmetric).unwrap();
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     state.load_factor = 2.0;
     let none = vec![0.0; 6 * model.rest.len()];
     system.evaluate(&state, 0.0, Some(&none)).unwrap();
@@ -303,7 +303,7 @@ fn a_turned_support_turns_the_whole_strip() {
         components: [true; 6],
         motion: Motion::turn([0.0; 3], [1.2, 0.0, 0.0], 1, ramp()),
     });
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
     for step in 1..=4 {
         solver.solve(&mut state, f64::from(step) / 4.0).unwrap();
@@ -319,7 +319,7 @@ fn a_turned_support_turns_the_whole_strip() {
 #[test]
 fn reactions_balance_the_loads() {
     let model = cantilever();
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
     solver.solve(&mut state, 1.0).unwrap();
     let sum: f64 = solver.reactions().enumerate().filter(|(node, _)| node % 9 == 0).map(|(_, r)| r[2]).sum();
@@ -333,11 +333,11 @@ fn arc_length_and_displacement_control_agree() {
     model.model_mut().loads[0].controlled = true;
     model.model_mut().loads[0].curve = hold();
     let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     for _ in 0..4 {
         solver.control(&mut state, Control::ArcLength { length: 1.0 }, 1.0).unwrap();
     }
-    let mut other = State::at_rest(&model);
+    let mut other = AssemblyState::at_rest(&model);
     let by = state.position[26].z;
     solver.control(&mut other, Control::Displacement { node: 26, component: 2, by }, 1.0).unwrap();
     assert!(state.load_factor > 0.0);
@@ -360,7 +360,7 @@ fn a_failed_load_step_keeps_what_was_found() {
     let kind = LoadKind::force(vec![26], Vector3::new(-3e6, 0.0, 1e3));
     model.model_mut().loads.push(Load::new("crush", kind, ramp()));
     let settings = StaticSettings { halvings: 3, iterations: 8, ..StaticSettings::default() };
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     let mut solver = Statics::new(model.clone(), settings).unwrap();
     let error = solver.solve(&mut state, 1.0).unwrap_err();
     println!("{error}");
@@ -371,7 +371,7 @@ fn a_failed_load_step_keeps_what_was_found() {
 #[test]
 fn only_the_difference_from_rest_costs_energy() {
     let model = model(ball(2), 0.01);
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     assert!(state.shell_energy(&model).unwrap().bending < 1e-20);
     state.position.iter_mut().for_each(|x| *x *= 1.1);
     assert!(state.shell_energy(&model).unwrap().membrane > 1.0);
@@ -386,7 +386,7 @@ fn the_curved_surface_is_watertight() {
         let model = model(shape, 0.01);
         for rule in [EdgeRule::Arc, EdgeRule::Third] {
             let surface = CurvedSurface::new(&model, rule);
-            let mut state = State::at_rest(&model);
+            let mut state = AssemblyState::at_rest(&model);
             let shake: Vec<f64> = (0..6 * model.rest.len()).map(|_| size * random.number()).collect();
             state.advance(&shake, 1.0);
             let mut at_edge: Vec<([u32; 2], Vector3<f64>)> = Vec::new();
@@ -419,7 +419,7 @@ fn the_curved_surface_of_a_ball_is_round() {
         model
     };
     let surface = CurvedSurface::new(&model, EdgeRule::Arc);
-    let state = State::at_rest(&model);
+    let state = AssemblyState::at_rest(&model);
     let picture = surface.picture(&model, 4);
     assert_eq!(picture.triangles.len(), 128 * 16);
     // A closed surface: V − E + F = 2 with E = 3F/2.
@@ -441,7 +441,7 @@ fn the_curved_surface_of_a_ball_is_round() {
 fn a_visual_mesh_is_carried() {
     let model = model(ball(2), 0.01);
     let surface = CurvedSurface::new(&model, EdgeRule::Arc);
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     let points: Vec<Vector3<f64>> = ball(3).0.iter().map(|p| 1.02 * p).collect();
     let near = |point: &Vector3<f64>| {
         let distance = |facet: &u32| {
@@ -533,7 +533,7 @@ fn a_block_of_tets_is_stretched_as_by_hooke() {
             model.model_mut().loads.push(Load::new("traction", kind, hold()));
         }
     }
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
     for (x, rest) in state.position.iter().zip(model.places()) {
         let strain = stress / 1e6;
@@ -570,7 +570,7 @@ fn shells_and_tets_move_together() {
         model
     };
     let sag = |model: &Assembly| {
-        let mut state = State::at_rest(model);
+        let mut state = AssemblyState::at_rest(model);
         Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
         state.position[8].z
     };
@@ -579,7 +579,7 @@ fn shells_and_tets_move_together() {
     println!("sag {bare:.3}, with skin {skinned:.3}");
     assert!(skinned < 0.0 && bare < 1.05 * skinned, "{bare} {skinned}");
     both.model_mut().bodies[0].damping = 2.0;
-    let mut state = State::at_rest(&both);
+    let mut state = AssemblyState::at_rest(&both);
     let mut solver = BackwardEuler::new(both.clone(), DynamicSettings::new(0.5)).unwrap();
     for _ in 0..100 {
         solver.advance(&mut state).unwrap();
@@ -608,7 +608,7 @@ fn a_twisted_strip_is_one_of_kirchhoff() {
                 motion,
             });
         }
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
         solver.solve(&mut state, 1.0).unwrap();
         let reactions: Vec<[f64; 6]> = solver.reactions().collect();
@@ -640,7 +640,7 @@ fn flat_triangles_lie_beside_curved_ones() {
     let [curved, flat] = [Vec::new(), (0..32).map(|t| t == 7).collect()].map(|flat| made(flat).unwrap());
     let bulge = |model: &Assembly, facet: u32| {
         let surface = CurvedSurface::new(model, EdgeRule::Arc);
-        let patch = surface.patch(model, &State::at_rest(model), facet);
+        let patch = surface.patch(model, &AssemblyState::at_rest(model), facet);
         let (start, normal) = (patch.corners()[0], patch.facet_normal());
         patch.edge_points().map(|x| normal.dot(&(x - start)))
     };

@@ -54,8 +54,8 @@ fn first_frequency(thickness: f64) -> f64 {
 }
 
 /// Period of the tip after a small push, from its zero crossings.
-fn period(mut advance: impl FnMut(&mut State), model: &Assembly, step: f64) -> f64 {
-    let mut state = State::at_rest(model);
+fn period(mut advance: impl FnMut(&mut AssemblyState), model: &Assembly, step: f64) -> f64 {
+    let mut state = AssemblyState::at_rest(model);
     for (v, x) in state.velocity.iter_mut().zip(model.places()) {
         v.z = 1e-3 * x.x * x.x;
     }
@@ -90,7 +90,7 @@ fn a_cantilever_vibrates_at_its_first_frequency() {
 
 /// Final state of a free strip after a number of steps a period by an integrator. Its springs are
 /// proportional to its masses, so it moves to and fro as one body, at 1 Hz.
-fn bobbing(integrator: Integrator, steps: u32, periods: u32) -> State {
+fn bobbing(integrator: Integrator, steps: u32, periods: u32) -> AssemblyState {
     let mut model = strip(THIN);
     for node in 0..model.rest.len() {
         let stiffness = TAU * TAU * model.mass[node];
@@ -99,7 +99,7 @@ fn bobbing(integrator: Integrator, steps: u32, periods: u32) -> State {
     let settings =
         DynamicSettings { integrator, tolerance: 1e-10, ..DynamicSettings::new(1.0 / f64::from(steps)) };
     let mut solver = BackwardEuler::new(model.clone(), settings).unwrap();
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     state.position.iter_mut().for_each(|x| x.z = 0.1);
     for _ in 0..steps * periods {
         solver.advance(&mut state).unwrap();
@@ -157,7 +157,7 @@ fn large_motion_is_of_second_order_and_goes_on_elsewhere() {
             ..DynamicSettings::new(0.8 / f64::from(steps))
         };
         let mut solver = BackwardEuler::new(model.clone(), settings).unwrap();
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         for step in 0..steps {
             if elsewhere && step == steps / 2 {
                 let previous = solver.previous().cloned();
@@ -194,7 +194,7 @@ fn springs_shorten_the_stable_step() {
     model.springs.push(crate::Spring { node: node as u32, anchor: model.place(node), stiffness });
     let step = ExplicitShells::stable_step(&model);
     assert!(step < 0.1 * free && step > 0.09 * free, "{step:e} {free:e}");
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     state.velocity[node].z = 1e-3;
     let mut solver = ExplicitShells::new(model.clone(), step).unwrap();
     for _ in 0..2000 {
@@ -210,11 +210,11 @@ fn springs_shorten_the_stable_step() {
 #[test]
 fn explicit_motion_keeps_its_energy() {
     let model = clamped(THIN);
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     for (v, x) in state.velocity.iter_mut().zip(model.places()) {
         v.z = 1.5 * x.x * x.x;
     }
-    let kinetic = |state: &State| -> f64 {
+    let kinetic = |state: &AssemblyState| -> f64 {
         let nodes = 0..model.rest.len();
         nodes
             .map(|i| {
@@ -241,11 +241,11 @@ fn explicit_motion_keeps_its_energy() {
 #[test]
 fn a_free_body_keeps_its_momentum() {
     let model = strip(THIN);
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     for (v, x) in state.velocity.iter_mut().zip(model.places()) {
         *v = Vector3::new(0.1, 0.2 * x.x, 0.5 * x.x * x.x);
     }
-    let momentum = |state: &State| {
+    let momentum = |state: &AssemblyState| {
         let nodes = 0..model.rest.len();
         nodes.fold((Vector3::zeros(), Vector3::zeros()), |(p, l), i| {
             let own = model.mass[i] * state.velocity[i];
@@ -269,7 +269,7 @@ fn a_free_body_keeps_its_momentum() {
 fn damped_motion_ends_in_the_static_equilibrium() {
     let mut model = clamped(THIN);
     weigh(&mut model, 0.5);
-    let mut rest = State::at_rest(&model);
+    let mut rest = AssemblyState::at_rest(&model);
     Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut rest, 1.0).unwrap();
     assert!(rest.position[16].z < -0.2, "{}", rest.position[16]);
     // About critical.
@@ -287,7 +287,7 @@ fn damped_motion_ends_in_the_static_equilibrium() {
     ] {
         let settings = DynamicSettings { linear, ..DynamicSettings::new(1.0) };
         let mut solver = BackwardEuler::new(model.clone(), settings).unwrap();
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         for _ in 0..60 {
             solver.advance(&mut state).unwrap();
         }
@@ -304,7 +304,7 @@ fn real_time_steps_follow_the_converged_motion() {
     model.model_mut().bodies[0].damping = 1.0;
     let run = |settings: DynamicSettings| {
         let mut solver = BackwardEuler::new(model.clone(), settings).unwrap();
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         for _ in 0..100 {
             solver.advance(&mut state).unwrap();
         }
@@ -329,11 +329,11 @@ fn bodies_are_damped_each_by_itself() {
     let alpha = 2.0;
     model.model_mut().bodies[1].damping = alpha;
     let flying = || {
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         state.velocity.fill(Vector3::new(0.0, 0.0, 0.5));
         state
     };
-    let slowed = |state: &State, ratio: f64| {
+    let slowed = |state: &AssemblyState, ratio: f64| {
         assert!((state.velocity[0].z - 0.5).abs() < 1e-9, "{}", state.velocity[0]);
         assert!((state.velocity[4].z / 0.5 - ratio.powi(10)).abs() < 1e-9, "{}", state.velocity[4]);
     };

@@ -6,7 +6,7 @@ use pliant_shells::rotation::{exponential, skew};
 use pliant_testing::Random;
 
 use super::{ball, model, strip};
-use crate::{CurvedSurface, State};
+use crate::{AssemblyState, CurvedSurface};
 
 /// A plate is stretched by 20 % and thinned to match. It is bent to a radius of 1 m at a thickness of 0.1 m,
 /// and turned by a radian. The strain in the middle is 20 %, exactly. Bent alone, the plate has the strain κ
@@ -15,7 +15,7 @@ use crate::{CurvedSurface, State};
 fn stretch_and_bending_are_told_apart() {
     let model = model(strip(), 0.1);
     let turn = exponential(&Vector3::new(1.0, -2.0, 0.5).normalize());
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     for (x, r) in state.position.iter_mut().zip(&mut state.rotation) {
         *x = turn * Vector3::new(1.2 * x.x, 0.9 * x.y, 0.0);
         *r = turn;
@@ -24,7 +24,7 @@ fn stretch_and_bending_are_told_apart() {
         assert!((strain.membrane - 0.2).abs() < 1e-12 && (strain.surface - 0.2).abs() < 1e-12);
     }
     let curvature = 1e-4;
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     for ((x, r), rest) in state.position.iter_mut().zip(&mut state.rotation).zip(model.places()) {
         x.z = 0.5 * curvature * rest.x * rest.x;
         *r = exponential(&Vector3::new(0.0, -curvature * rest.x, 0.0));
@@ -43,7 +43,7 @@ fn a_closed_surface_has_no_resultant_and_a_symmetric_change() {
     let mut random = Random::new(3);
     let model = model(ball(1), 0.01);
     let surface = CurvedSurface::new(&model, EdgeRule::Arc);
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     let shake: Vec<f64> = (0..6 * model.rest.len()).map(|_| 0.1 * random.number()).collect();
     state.advance(&shake, 1.0);
     let size = shake.len();

@@ -8,7 +8,7 @@ use pliant_contact::barrier::BarrierSettings;
 use pliant_contact::pose::Pose;
 use pliant_contact::shape::Shape;
 use pliant_contact::touch::{Contact, Contacts, Touch, With};
-use pliant_implicit::{Assembly, BackwardEuler, DynamicSettings, State};
+use pliant_implicit::{Assembly, AssemblyState, BackwardEuler, DynamicSettings};
 use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
 use pliant_mechanics::load::Load;
 use pliant_mechanics::model::{Cells, Material, Solid};
@@ -95,8 +95,8 @@ fn sunk(friction: f64) -> f64 {
     touch(&mut model, Contacts { rigids: vec![floor], contacts, ..Default::default() }, barrier);
     let settings = DynamicSettings { iterations: 200, ..DynamicSettings::new(5e-3) };
     let mut solver = BackwardEuler::new(model.clone(), settings).unwrap();
-    let mut state = State::at_rest(&model);
-    let crown = |state: &State| state.position.iter().map(|x| x.z).fold(0.0, f64::max);
+    let mut state = AssemblyState::at_rest(&model);
+    let crown = |state: &AssemblyState| state.position.iter().map(|x| x.z).fold(0.0, f64::max);
     let start = crown(&state);
     let mut iterations = 0;
     while state.time < 0.4 - 1e-9 {

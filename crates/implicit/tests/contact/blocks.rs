@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use pliant_contact::barrier::BarrierSettings;
 use pliant_contact::shape::Shape;
 use pliant_implicit::AssemblySolver;
-use pliant_implicit::{Assembly, BackwardEuler, DynamicSettings, State};
+use pliant_implicit::{Assembly, AssemblyState, BackwardEuler, DynamicSettings};
 use pliant_mechanics::curve::{Curve, Shape as CurveShape};
 use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
 use pliant_mechanics::load::{Load, LoadKind};
@@ -67,7 +67,7 @@ fn slid(friction: f64, step: f64) -> [f64; 2] {
         BarrierSettings { distance: GAP, stiffness: 0.1 * YOUNG, creep_speed: CREEP },
     );
     let mut solver = BackwardEuler::new(model.clone(), settings(step)).unwrap();
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     let (mut iterations, mut start) = (0, [Vector3::zeros(); 2]);
     while state.time < 1.2 - 1e-9 {
         iterations += solver.advance(&mut state).unwrap().residuals.len();
@@ -126,7 +126,7 @@ fn friction_is_mu_times_the_normal_force_in_every_direction() {
         );
         let step = 0.01;
         let mut solver = BackwardEuler::new(model.clone(), settings(step)).unwrap();
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         state.velocity.iter_mut().for_each(|v| *v = 0.01 * along);
         // A spring at each node of the top that goes along.
         let weight = 9.81 * model.mass.iter().sum::<f64>();

@@ -5,7 +5,7 @@ use pliant_contact::barrier::BarrierSettings;
 use pliant_contact::pressure::{faces, pressures};
 use pliant_contact::touch::{Contact, Contacts, Touch, With};
 use pliant_implicit::AssemblySolver;
-use pliant_implicit::{Assembly, BackwardEuler, DynamicSettings, State, StaticSettings, Statics};
+use pliant_implicit::{Assembly, AssemblyState, BackwardEuler, DynamicSettings, StaticSettings, Statics};
 use pliant_mechanics::curve::{Curve, Shape as CurveShape};
 use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
 use pliant_mechanics::model::{Cells, Constraint, Material, Motion, Solid};
@@ -40,7 +40,7 @@ fn between(first: Vec<[u32; 3]>, second: Vec<[u32; 3]>, friction: f64) -> Contac
 
 /// Nominal stress [Pa] of a neo-Hookean tet, and its volume [m³] at rest. The stress is P = μ J^(−2/3) (F −
 /// I₁/3 F⁻ᵀ) + κ (J − 1) J F⁻ᵀ.
-fn stress(model: &Assembly, state: &State, nodes: &[u32]) -> (Matrix3<f64>, f64) {
+fn stress(model: &Assembly, state: &AssemblyState, nodes: &[u32]) -> (Matrix3<f64>, f64) {
     let edges = |at: &dyn Fn(usize) -> Vector3<f64>| {
         let [a, b, c, d] = [0, 1, 2, 3].map(|k| at(nodes[k] as usize));
         Matrix3::from_columns(&[b - a, c - a, d - a])
@@ -99,7 +99,7 @@ fn a_uniform_pressure_goes_through_cells_that_do_not_match() {
     touch(&mut model, contacts, BarrierSettings { distance: barrier, stiffness, creep_speed: 1e-3 });
     let settings = StaticSettings { iterations: 200, ..StaticSettings::default() };
     let mut solver = Statics::new(model.clone(), settings).unwrap();
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     let mut iterations = 0;
     for step in 1..=10 {
         iterations += solver.solve(&mut state, 0.1 * f64::from(step)).unwrap().residuals.len();
@@ -165,7 +165,7 @@ fn forces_between_bodies_have_no_sum_and_no_moment() {
             touch(&mut model, between(first, second, friction), settings);
             let settings = DynamicSettings { iterations: 100, ..DynamicSettings::new(2e-3) };
             let mut solver = BackwardEuler::new(model.clone(), settings).unwrap();
-            let mut state = State::at_rest(&model);
+            let mut state = AssemblyState::at_rest(&model);
             state.velocity[half..].fill(Vector3::new(-0.03, 0.0, -0.3));
             for _ in 0..60 {
                 solver.advance(&mut state).unwrap();

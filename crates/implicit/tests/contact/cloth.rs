@@ -7,7 +7,7 @@ use pliant_contact::barrier::BarrierSettings;
 use pliant_contact::shape::Shape;
 use pliant_contact::touch::{Contact, Touch, With};
 use pliant_implicit::AssemblySolver;
-use pliant_implicit::{Assembly, BackwardEuler, DynamicSettings, Shell, State};
+use pliant_implicit::{Assembly, AssemblyState, BackwardEuler, DynamicSettings, Shell};
 use pliant_mechanics::curve::{Curve, Shape as CurveShape};
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::model::{Constraint, Motion};
@@ -78,7 +78,7 @@ fn threads_and_a_restart_change_no_bit() {
     let run = |threads: usize, stop: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
-            let (mut first, mut state) = (solver(&model), State::at_rest(&model));
+            let (mut first, mut state) = (solver(&model), AssemblyState::at_rest(&model));
             for step in 0..30 {
                 if step == stop {
                     let pairs = first.contact().unwrap().pairs().to_vec();
@@ -100,7 +100,7 @@ fn threads_and_a_restart_change_no_bit() {
 fn draped(cells: u32, friction: f64, until: f64) -> f64 {
     let model = cloth(cells, friction);
     let mut solver = solver(&model);
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     let (start, mut iterations, mut slowest, mut halved, mut least) =
         (Instant::now(), 0, 0.0_f64, 0, f64::INFINITY);
     let (mut steps, mut rows) = (0, 0);
@@ -192,7 +192,7 @@ fn a_twisted_strip_does_not_go_through_itself() {
         BarrierSettings { distance: 3e-4, stiffness: 0.1 * young, creep_speed: 1e-3 },
     );
     let mut solver = solver(&model);
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     let (start, mut touched, mut halved) = (Instant::now(), 0, 0);
     for _ in 0..100 {
         let done = solver.advance(&mut state).unwrap_or_else(|error| panic!("{error}"));

@@ -9,7 +9,7 @@ use pliant_contact::pose::Trajectory;
 use pliant_contact::shape::Shape;
 use pliant_contact::touch::{Contact, Contacts, Rigid, Touch, With};
 use pliant_implicit::AssemblySolver;
-use pliant_implicit::{Assembly, BackwardEuler, DynamicSettings, State};
+use pliant_implicit::{Assembly, AssemblyState, BackwardEuler, DynamicSettings};
 use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
 use pliant_mechanics::load::Load;
 use pliant_mechanics::model::{Cells, Material, Solid};
@@ -78,7 +78,7 @@ fn play(scene: &Scene, is_rigid: bool) -> Result<(), String> {
     let settings = DynamicSettings { iterations: 200, ..DynamicSettings::new(5e-3) };
     let mut solver =
         BackwardEuler::new(model.clone(), settings).map_err(|error| format!("{name}: {error}"))?;
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     state.velocity = velocity;
     let (mut steps, mut iterations, mut touched, mut halved) = (0, 0, 0, 0);
     let (mut fastest, mut least) = (0.0_f64, f64::INFINITY);

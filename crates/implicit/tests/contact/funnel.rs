@@ -8,7 +8,7 @@ use pliant_contact::pose::{Pose, Trajectory};
 use pliant_contact::profile::{Corner, Profile};
 use pliant_contact::shape::Shape;
 use pliant_implicit::AssemblySolver;
-use pliant_implicit::{Assembly, BackwardEuler, DynamicSettings, State};
+use pliant_implicit::{Assembly, AssemblyState, BackwardEuler, DynamicSettings};
 use pliant_mechanics::curve::{Curve, Shape as CurveShape};
 use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
 use pliant_mechanics::model::{Cells, Material, Solid};
@@ -58,9 +58,9 @@ fn a_ball_goes_through_a_narrow_tube_and_is_round_again() {
     touch(&mut model, at_rigid(&own, vec![funnel, plunger], 0.1, 0.0), barrier);
     let settings = DynamicSettings { iterations: 200, ..DynamicSettings::new(0.01) };
     let mut solver = BackwardEuler::new(model.clone(), settings).unwrap();
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     // How much longer or shorter an edge has become at most.
-    let stretched = |state: &State| {
+    let stretched = |state: &AssemblyState| {
         let ends =
             [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]];
         let edges =

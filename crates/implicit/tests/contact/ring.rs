@@ -9,7 +9,7 @@ use pliant_contact::pose::{Pose, Trajectory};
 use pliant_contact::shape::Shape;
 use pliant_implicit::AssemblySolver;
 use pliant_implicit::{
-    Assembly, BackwardEuler, DynamicSettings, Integrator, Shell, State, StaticSettings, Statics,
+    Assembly, AssemblyState, BackwardEuler, DynamicSettings, Integrator, Shell, StaticSettings, Statics,
 };
 use pliant_mechanics::curve::{Curve, Shape as CurveShape};
 use pliant_mechanics::load::{Load, LoadKind};
@@ -78,7 +78,7 @@ fn pressed(edges: u32, thickness: f64, approach: f64, steps: u32) -> Vec<[f64; 2
     );
     let settings = StaticSettings { iterations: 200, ..StaticSettings::default() };
     let mut solver = Statics::new(model.clone(), settings).unwrap();
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     let stiffness = YOUNG * thickness.powi(3) / (12.0 * (1.0 - POISSON * POISSON)) * width;
     let mut rows = Vec::new();
     let mut iterations = 0;
@@ -164,9 +164,9 @@ fn dropped(integrator: Integrator, step: f64) -> Rebound {
     let settings =
         DynamicSettings { integrator, iterations: 200, tolerance: 1e-9, ..DynamicSettings::new(step) };
     let mut solver = BackwardEuler::new(model.clone(), settings).unwrap();
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     state.velocity.iter_mut().for_each(|v| v.z = -0.5);
-    let energy = |state: &State, barrier: f64| {
+    let energy = |state: &AssemblyState, barrier: f64| {
         let moving: f64 = (0..model.rest.len())
             .map(|n| {
                 0.5 * model.mass[n] * state.velocity[n].norm_squared()
@@ -184,7 +184,7 @@ fn dropped(integrator: Integrator, step: f64) -> Rebound {
     let mut rebound = Rebound { grown: 0.0, drift: 0.0, touched: 0, speed: 0.0 };
     // Until it is a millimetre above the floor on its way up: it trembles, and leaves the floor for some
     // steps before.
-    let flies_up = |state: &State| {
+    let flies_up = |state: &AssemblyState| {
         let lowest = state.position.iter().map(|x| x.z).fold(f64::INFINITY, f64::min);
         lowest + RADIUS + 3e-3 > 1e-3 && mean(&model, &state.velocity).z > 0.0
     };

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use pliant_contact::barrier::BarrierSettings;
 use pliant_contact::shape::Shape;
 use pliant_implicit::AssemblySolver;
-use pliant_implicit::{BackwardEuler, DynamicSettings, Integrator, Spring, State};
+use pliant_implicit::{AssemblyState, BackwardEuler, DynamicSettings, Integrator, Spring};
 
 use super::blocks::{block, weigh};
 use super::{at_rigid, fixed, mean, surface, touch};
@@ -53,7 +53,7 @@ fn a_block_on_a_spring_sticks_and_slips() {
     let integrator = Integrator::Bdf2;
     let settings = DynamicSettings { iterations: 100, integrator, ..DynamicSettings::new(step) };
     let mut solver = BackwardEuler::new(model.clone(), settings).unwrap();
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     let (mut rest, mut way, mut fastest) = (0.0, Vec::new(), 0.0_f64);
     let mut largest: f64 = 0.0;
     for count in 1.. {

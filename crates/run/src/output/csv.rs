@@ -10,7 +10,7 @@ use pliant_geometry::Vector3;
 use pliant_mechanics::Energies;
 use pliant_mechanics::model::Enclosed;
 use pliant_mechanics::tensor::add;
-use pliant_scene::{Built, Part, World};
+use pliant_scene::{Built, PlannedParticipant, World};
 use pliant_shells::Carried;
 use pliant_sim::BodyCells;
 use pliant_sim::contact::touch::With;
@@ -144,7 +144,7 @@ const TENSOR: [&str; 9] = ["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"]
 
 impl Columns {
     /// Its columns go to `columns`.
-    fn new(part: &Part, table: &CsvTable, columns: &mut Vec<Column>) -> Self {
+    fn new(part: &PlannedParticipant, table: &CsvTable, columns: &mut Vec<Column>) -> Self {
         let built = &*part.built;
         let wanted = |name: &String| table.reactions.as_ref().is_none_or(|list| list.contains(name));
         let constraints = built.model.constraints.iter();

@@ -4,7 +4,7 @@ use nalgebra::Matrix3;
 use pliant_explicit::NodeContact;
 use pliant_explicit::recover::CellFields;
 use pliant_format::tables::FieldName;
-use pliant_implicit::{Assembly, ShellFields, State};
+use pliant_implicit::{Assembly, AssemblyState, ShellFields};
 use pliant_mechanics::model::{Model, Motion};
 use pliant_mechanics::tensor::Symmetric;
 use rayon::prelude::*;
@@ -144,7 +144,7 @@ pub(super) struct OfShells {
 
 impl OfShells {
     /// Finds them for the instant of a frame.
-    pub fn fill(&mut self, model: &Assembly, state: &State, wanted: &[FieldName]) {
+    pub fn fill(&mut self, model: &Assembly, state: &AssemblyState, wanted: &[FieldName]) {
         if wanted.contains(&FieldName::ElementStep) && self.steps.is_empty() {
             self.steps = model.facets.par_iter().map(|facet| facet.stable_step()).collect();
         }

@@ -23,7 +23,7 @@ use std::rc::Rc;
 
 use pliant_explicit::recover::CellFields;
 use pliant_format::tables::FieldName;
-use pliant_scene::{Built, Part, World};
+use pliant_scene::{Built, PlannedParticipant, World};
 use pliant_sim::{CellsNow, Instant, Simulation};
 use serde::{Deserialize, Serialize};
 
@@ -68,14 +68,14 @@ impl OutputError {
 
 /// One participant at an instant, seen between the two halves of a step.
 pub(crate) struct Frame<'a> {
-    pub part: &'a Part,
+    pub part: &'a PlannedParticipant,
     pub now: &'a dyn Instant,
     /// Fields of its cells, once an output has asked for some.
     cells: OnceCell<Option<Recovered<'a>>>,
 }
 
 impl<'a> Frame<'a> {
-    pub(crate) fn new(part: &'a Part, now: &'a dyn Instant) -> Self {
+    pub(crate) fn new(part: &'a PlannedParticipant, now: &'a dyn Instant) -> Self {
         Self { part, now, cells: OnceCell::new() }
     }
 

@@ -10,7 +10,7 @@ use pliant_geometry::words::{counted, number};
 use pliant_mechanics::Energies;
 use pliant_mechanics::count;
 use pliant_mechanics::model::Enclosed;
-use pliant_scene::{Part, World};
+use pliant_scene::{PlannedParticipant, World};
 use pliant_sim::contact::barrier::IntersectionCheck;
 use pliant_sim::contact::lag::Lag;
 use pliant_sim::{CoupledSurfaceNow, Effort, Equilibria, Failure, Instant, TieNow};
@@ -48,7 +48,7 @@ pub(crate) struct Outcome {
 impl Outcome {
     /// Makes the outcome of a run whose steppers could not be made.
     pub(crate) fn not_begun(failure: Failure, world: &World) -> Self {
-        let part = |part: &Part| PartOutcome {
+        let part = |part: &PlannedParticipant| PartOutcome {
             reactions: vec![[0.0; 3]; part.built.model.constraints.len()],
             ..PartOutcome::default()
         };
@@ -109,7 +109,7 @@ pub(crate) struct HeldBack {
 }
 
 impl PartOutcome {
-    pub fn new(part: &Part, participant: &dyn Instant, watched: Watched) -> Self {
+    pub fn new(part: &PlannedParticipant, participant: &dyn Instant, watched: Watched) -> Self {
         let watches = part.plan.limits.is_some() && part.scene.run.solver == SolverName::Explicit;
         let frame = Frame::new(part, participant);
         Self {
@@ -133,7 +133,7 @@ impl PartOutcome {
 
 /// Tools, and constraints that move nodes or fill volumes, that were held back by the limits of their forces
 /// and pressures.
-fn held_back(part: &Part, now: &dyn Instant) -> Vec<HeldBack> {
+fn held_back(part: &PlannedParticipant, now: &dyn Instant) -> Vec<HeldBack> {
     let of = |name: &str, is_volume: bool, lag: &Lag| {
         let (lag, time) = lag.longest();
         (lag > 0.0).then(|| HeldBack { name: name.to_owned(), is_volume, lag, time })
@@ -264,7 +264,7 @@ pub struct Intersections {
 
 impl Intersections {
     /// Looks at an instant of a participant.
-    pub(crate) fn look(&mut self, check: &IntersectionCheck, part: &Part, now: &dyn Instant) {
+    pub(crate) fn look(&mut self, check: &IntersectionCheck, part: &PlannedParticipant, now: &dyn Instant) {
         let rest = &part.built.model.rest;
         let place =
             |node: u32| Vector3::from(rest[node as usize]) + Vector3::from(now.displacement(node as usize));
@@ -308,7 +308,7 @@ impl Intersections {
 }
 
 impl Watched {
-    pub fn see(&mut self, part: &Part, participant: &dyn Instant) {
+    pub fn see(&mut self, part: &PlannedParticipant, participant: &dyn Instant) {
         if participant.largest_energy() > participant.balance_floor() {
             self.worst_balance = self.worst_balance.max(participant.energies().balance);
         }
@@ -321,7 +321,7 @@ impl Watched {
 /// Hourglass energy over internal energy, if it is above a share; none while both together are below the
 /// energy from which on they mean something. A vibrating body has no internal energy at times, so a hundredth
 /// of the largest energy counts as internal at least.
-fn hourglass_share(part: &Part, participant: &dyn Instant, above: f64) -> Option<f64> {
+fn hourglass_share(part: &PlannedParticipant, participant: &dyn Instant, above: f64) -> Option<f64> {
     let Energies { internal, hourglass, .. } = participant.energies();
     let share = hourglass / internal.max(0.01 * participant.largest_energy()).max(f64::MIN_POSITIVE);
     let floor = participant.balance_floor();

@@ -10,7 +10,7 @@ use std::thread::{Scope, ScopedJoinHandle};
 use pliant_explicit::Wanted;
 use pliant_format::registry::OutputTable;
 use pliant_scene::World;
-use pliant_sim::{Failure, FailureKind, Schedule, Simulation, State};
+use pliant_sim::{Failure, FailureKind, Schedule, Simulation, SimulationState};
 
 use super::{Output, OutputError, Written, csv, frames, output_failure, vtu};
 
@@ -38,7 +38,7 @@ struct Far<'scope> {
 
 enum Task {
     /// Shows a state to the outputs of these places.
-    See(Box<State>, Vec<usize>),
+    See(Box<SimulationState>, Vec<usize>),
     /// Answers with what the outputs have written so far.
     Written(Sender<Vec<(usize, Written)>>),
     /// Removes what an interrupted run had written beyond the end.

@@ -7,7 +7,7 @@ use pliant_explicit::stability::StepLimit;
 use pliant_format::tables::OnUnstableName;
 use pliant_geometry::words::{counted, number};
 use pliant_mechanics::Energies;
-use pliant_scene::{Built, Part, World};
+use pliant_scene::{Built, PlannedParticipant, World};
 use pliant_sim::{Failure, FailureKind};
 use serde::Serialize;
 
@@ -50,8 +50,8 @@ pub struct StabilitySummary {
 }
 
 impl StabilitySummary {
-    pub(crate) fn new(part: &Part, outcome: &PartOutcome) -> Option<Self> {
-        let Part { scene, plan, .. } = part;
+    pub(crate) fn new(part: &PlannedParticipant, outcome: &PartOutcome) -> Option<Self> {
+        let PlannedParticipant { scene, plan, .. } = part;
         let seen = outcome.stability?;
         let of = |value: fn(&StepLimit) -> f64| seen.smallest.as_ref().map(value);
         Some(Self {

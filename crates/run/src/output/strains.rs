@@ -1,7 +1,7 @@
 //! Largest strains of shells, and the warning where they exceed the range of small-strain elasticity.
 
 use pliant_geometry::words::number;
-use pliant_implicit::State;
+use pliant_implicit::AssemblyState;
 use pliant_sim::BodyCells;
 use serde::{Deserialize, Serialize};
 
@@ -33,7 +33,7 @@ pub(crate) struct ShellStrains(pub Vec<StrainSummary>);
 
 impl ShellStrains {
     /// Looks at an instant.
-    pub fn look(&mut self, built: &Built, state: Option<&State>) {
+    pub fn look(&mut self, built: &Built, state: Option<&AssemblyState>) {
         let (Some(part), Some(state)) = (&built.implicit, state) else { return };
         if part.model.facets.is_empty() {
             return;

@@ -7,7 +7,7 @@ use pliant_format::printable;
 use pliant_geometry::words::{counted, number};
 use pliant_mechanics::Energies;
 use pliant_mechanics::model::{Constraint, Enclosed};
-use pliant_scene::{Built, LimitingElement, Limits, Part, World};
+use pliant_scene::{Built, LimitingElement, Limits, PlannedParticipant, World};
 use pliant_sim::{Critical, Effort, Equilibria, Failure, FailureKind};
 use serde::{Serialize, Serializer};
 use serde_json::{Value as Json, json};
@@ -120,7 +120,7 @@ pub struct ParticipantSummary {
 }
 
 impl ParticipantSummary {
-    fn new(part: &Part, outcome: &PartOutcome) -> Self {
+    fn new(part: &PlannedParticipant, outcome: &PartOutcome) -> Self {
         Self {
             name: part.name.clone(),
             bodies: part.scene.bodies.iter().map(|(name, _)| name.clone()).collect(),
@@ -231,7 +231,7 @@ pub(crate) fn summarise(world: &World, outcome: &Outcome) -> Summary {
     let bodies: Vec<BodySummary> = parts().flat_map(|(part, _)| bodies(&part.built)).collect();
     let limits = parts().find_map(|(part, _)| part.plan.limits.as_ref());
     let stability = || parts().map(|(part, own)| StabilitySummary::new(part, own));
-    let doubts = |((part, own), seen): ((&Part, &PartOutcome), Option<StabilitySummary>)| {
+    let doubts = |((part, own), seen): ((&PlannedParticipant, &PartOutcome), Option<StabilitySummary>)| {
         doubts(&part.built, own, seen.as_ref())
     };
     let reactions = parts()
@@ -375,8 +375,8 @@ fn write_page(page: &mut String, world: &World, outcome: &Outcome, summary: &Sum
 }
 
 /// Steps, equations, strains and energies of a participant.
-fn write_part(page: &mut String, part: &Part, outcome: &PartOutcome) -> std::fmt::Result {
-    let Part { built, plan, .. } = part;
+fn write_part(page: &mut String, part: &PlannedParticipant, outcome: &PartOutcome) -> std::fmt::Result {
+    let PlannedParticipant { built, plan, .. } = part;
     let of = part.prefix().map(|name| format!(" of `{name}`")).unwrap_or_default();
     writeln!(page, "\n## Time step{of}\n")?;
     writeln!(page, "| | |\n|---|---|")?;

@@ -326,7 +326,7 @@ fn hands_and_forces_move_explicit_shells_on_a_device() {
     let run = |device: &str| {
         let world = world(&explicit_tube(&format!("device = \"{device}\""))).unwrap();
         let mut simulation = world.simulation().unwrap();
-        let nodes = simulation.world().parts[0].model.node_count();
+        let nodes = simulation.setup().parts[0].model.node_count();
         let (held, pushed) = (nodes as u32 / 2, nodes / 2 + 1);
         let [x, y, z] = simulation.rest(held);
         let grip = Grip { nodes: vec![(held, 1.0)], place: [x, y, z + 0.005], stiffness: 5.0 };

@@ -107,8 +107,8 @@ fn a_program_closes_jaws_and_drives_them() {
     simulation.step(1).unwrap();
     let bytes = simulation.encode().unwrap();
     let state = simulation.state().unwrap();
-    let decoded = pliant_sim::State::decode(simulation.world(), &bytes).unwrap();
-    let again = |state| Simulation::resumed(simulation.world().clone(), state).unwrap();
+    let decoded = pliant_sim::SimulationState::decode(simulation.setup(), &bytes).unwrap();
+    let again = |state| Simulation::resumed(simulation.setup().clone(), state).unwrap();
     let prints = [again(state), again(decoded)].map(work);
     assert_eq!([work(simulation); 2], prints);
 }
@@ -141,8 +141,8 @@ fn a_grasper_moves_while_it_closes() {
         assert!((tool.pose.translation.z - 0.045 - 0.03 * part).abs() < 1e-9, "{tool:?}");
         assert!((tool.opening - 0.4 + 0.2 * part).abs() < 1e-9, "{tool:?}");
         let bytes = simulation.encode().unwrap();
-        let state = pliant_sim::State::decode(simulation.world(), &bytes).unwrap();
-        let mut simulation = Simulation::resumed(simulation.world().clone(), state).unwrap();
+        let state = pliant_sim::SimulationState::decode(simulation.setup(), &bytes).unwrap();
+        let mut simulation = Simulation::resumed(simulation.setup().clone(), state).unwrap();
         simulation.run(there, |_| ()).unwrap();
         let tool = simulation.frame().unwrap().tool("grasper").unwrap();
         assert!((tool.pose.inverse() * goal).translation.vector.norm() < 1e-12);

@@ -7,7 +7,7 @@ use pliant_contact::lag::Lag;
 use pliant_contact::pose::Leg;
 use pliant_contact::pressure::{faces, pressures};
 use pliant_explicit::NodeContact;
-use pliant_implicit::State;
+use pliant_implicit::AssemblyState;
 use pliant_mechanics::Energies;
 use pliant_mechanics::model::Enclosed;
 
@@ -106,7 +106,7 @@ impl Instant for Assembled {
         Some(Box::new(SolidCells::new(&self.model, self.solids.as_ref()?)))
     }
 
-    fn shells(&self) -> Option<&State> {
+    fn shells(&self) -> Option<&AssemblyState> {
         Some(&self.state)
     }
 

@@ -2,8 +2,8 @@
 
 use pliant_contact::lag::Lag;
 use pliant_implicit::{
-    AssemblySolver, Attempted, BackwardEuler, ContactSystem, ExplicitShells, Forces, SolveError, State,
-    Statics,
+    AssemblySolver, AssemblyState, Attempted, BackwardEuler, ContactSystem, ExplicitShells, Forces,
+    SolveError, Statics,
 };
 
 /// A solver, and the forces at an instant: an explicit one finds them anyway.
@@ -78,7 +78,7 @@ impl SolverMethod {
     }
 
     /// Finds the forces at a state.
-    pub(super) fn evaluate(&mut self, state: &State) -> Result<(), SolveError> {
+    pub(super) fn evaluate(&mut self, state: &AssemblyState) -> Result<(), SolveError> {
         match self {
             Self::Static(_, forces) | Self::Implicit(_, forces) => forces.evaluate(state),
             Self::Explicit(solver) => solver.evaluate(state),

@@ -16,8 +16,8 @@ use nalgebra::Vector3;
 #[cfg(feature = "gpu")]
 use pliant_gpu::GpuShells;
 use pliant_implicit::{
-    AssemblySolver, Attempted, BackwardEuler, ContactNow, ContactSystem, DynamicSettings, ExplicitShells,
-    Forces, Phases, SolveError, Spring, State, Statics,
+    AssemblySolver, AssemblyState, Attempted, BackwardEuler, ContactNow, ContactSystem, DynamicSettings,
+    ExplicitShells, Forces, Phases, SolveError, Spring, Statics,
 };
 #[cfg(feature = "gpu")]
 use pliant_linear::LinearDevice;
@@ -33,7 +33,7 @@ use self::method::SolverMethod;
 use crate::bodies::{ImplicitBodies, RunControl};
 use crate::failure::{FailedLoadStep, Failure, FailureKind};
 use crate::instant::Effort;
-use crate::part::{self, Part};
+use crate::participant_setup::{self, ParticipantSetup};
 use crate::path::{Path, part_of};
 use crate::snapshot::{ContactState, ImplicitState, Iterated, PlainState};
 use crate::steps::Steps;
@@ -52,7 +52,7 @@ pub(crate) struct Assembled {
     method: SolverMethod,
     /// Steps of the whole run.
     steps: Steps,
-    state: State,
+    state: AssemblyState,
     /// Whole steps done, and the time [s] they end at.
     done: u64,
     time: f64,
@@ -62,7 +62,7 @@ pub(crate) struct Assembled {
     owners: Vec<[u32; 3]>,
     /// Force [N] and moment [N m] on each node from outside at the instant before, six a node, with its
     /// positions and rotations.
-    before: Option<(Vec<f64>, State)>,
+    before: Option<(Vec<f64>, AssemblyState)>,
     /// The external forces and moments at the instant that is evaluated.
     outside: Vec<f64>,
     energies: Energies,
@@ -97,13 +97,13 @@ impl Assembled {
     ///
     /// # Errors
     /// If its solver can't be made.
-    pub(crate) fn new(part: &Part, bodies: &Arc<ImplicitBodies>) -> Result<Self, Failure> {
+    pub(crate) fn new(part: &ParticipantSetup, bodies: &Arc<ImplicitBodies>) -> Result<Self, Failure> {
         let (model, own) = (&bodies.model, &part.model);
         let forces = || Forces::new(model.clone());
         let method = match &part.method {
-            part::Method::Static(_, settings) => Statics::new(model.clone(), *settings)
+            participant_setup::Method::Static(_, settings) => Statics::new(model.clone(), *settings)
                 .map(|solver| SolverMethod::Static(Box::new(solver), forces())),
-            part::Method::Implicit(_, own) => {
+            participant_setup::Method::Implicit(_, own) => {
                 let settings = DynamicSettings { step: part.steps.step, ..own.settings };
                 #[cfg(feature = "gpu")]
                 let device = own.device.clone().map(|device| Arc::new(device) as Arc<dyn LinearDevice>);
@@ -112,10 +112,12 @@ impl Assembled {
                 BackwardEuler::on(device, model.clone(), settings)
                     .map(|solver| SolverMethod::Implicit(Box::new(solver), forces()))
             }
-            part::Method::Explicit(_)
-            | part::Method::QuasiStatic { .. }
-            | part::Method::ExplicitShells(..) => ExplicitShells::new(model.clone(), part.steps.step)
-                .map(|solver| SolverMethod::Explicit(Box::new(solver))),
+            participant_setup::Method::Explicit(_)
+            | participant_setup::Method::QuasiStatic { .. }
+            | participant_setup::Method::ExplicitShells(..) => {
+                ExplicitShells::new(model.clone(), part.steps.step)
+                    .map(|solver| SolverMethod::Explicit(Box::new(solver)))
+            }
         };
         let prescribed = model.held_components();
         let mut state = bodies.start.clone();
@@ -124,7 +126,10 @@ impl Assembled {
         }
         #[cfg(feature = "gpu")]
         let device = match &part.method {
-            part::Method::ExplicitShells(_, part::ShortSteps { device: Some(device) }) => {
+            participant_setup::Method::ExplicitShells(
+                _,
+                participant_setup::ShortSteps { device: Some(device) },
+            ) => {
                 let mut stepper = GpuShells::new(device, model.clone(), part.steps.step)
                     .map_err(|error| Failure::device(&error, None))?;
                 stepper.upload(&state);

@@ -12,8 +12,8 @@ use pliant_explicit::Wanted;
 use pliant_implicit::Assembly;
 
 use super::*;
-use crate::part::ShortSteps;
 use crate::participant::Participant;
+use crate::participant_setup::ShortSteps;
 use crate::{Method, Steps};
 
 /// A strip of two facets, clamped at two of its four nodes, in explicit steps of a part of the stable one.
@@ -23,10 +23,10 @@ fn strip(steps: ShortSteps, of_stable: f64) -> Assembled {
     let material = Wall { elastic: Elasticity { young: 1e6, poisson: 0.3 }, density: 1000.0 };
     model.add_shell(&Shell::new("strip", vec![[0, 2, 3], [0, 3, 1]], 0.002, material)).unwrap();
     model.model_mut().fix("clamp", vec![0, 1]);
-    let part = Part::implicit("strip", model, 0.1, 0.01);
+    let part = ParticipantSetup::implicit("strip", model, 0.1, 0.01);
     let Method::Implicit(bodies, _) = &part.method else { panic!("an implicit part") };
     let step = of_stable * ExplicitShells::stable_step(&bodies.model);
-    let part = Part {
+    let part = ParticipantSetup {
         method: Method::ExplicitShells(Arc::clone(bodies), steps),
         steps: Steps::within(0.1, step),
         ..part.clone()

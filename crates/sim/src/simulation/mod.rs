@@ -1,8 +1,9 @@
-//! A world and its state, brought from one common instant of all participants to the next.
+//! A setup of participants and its state, brought from one common instant of all participants to the next.
 
 mod observer;
+mod restore;
+mod setup;
 mod state;
-mod world;
 
 use std::sync::Arc;
 
@@ -13,22 +14,22 @@ use pliant_mechanics::tensor::Vector;
 use pliant_mechanics::{Energies, Model, StopFlag, fingerprint};
 
 pub use self::observer::{Frame, Observer};
-pub use self::state::State;
+pub use self::setup::Setup;
+pub use self::state::SimulationState;
 use self::state::{Between, OwnState};
-pub use self::world::World;
 use crate::coupled_surfaces::{CoupledSurfaceNow, Meetings};
 #[cfg(feature = "gpu")]
 use crate::device::OnDevice;
 use crate::failure::{Failure, FailureKind};
 use crate::instant::Instant;
-use crate::part::Part;
 use crate::participant::Participant;
+use crate::participant_setup::ParticipantSetup;
 use crate::penalty::{Springs, TieNow};
 use crate::schedule::steps_to;
 use crate::solver::LoadStepProgress;
 use crate::start::{Before, begin, go_on};
 
-/// A world under way. It owns all it needs, so it can be kept anywhere and moved to another thread. After a
+/// A setup under way. It owns all it needs, so it can be kept anywhere and moved to another thread. After a
 /// failure it stays at the last good instant.
 ///
 /// ```
@@ -36,7 +37,7 @@ use crate::start::{Before, begin, go_on};
 /// use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
 /// use pliant_mechanics::load::Load;
 /// use pliant_mechanics::model::{Cells, Material, Solid};
-/// use pliant_sim::{Part, Simulation};
+/// use pliant_sim::{ParticipantSetup, Simulation};
 ///
 /// // One tetrahedron, one face held, falling under its own weight.
 /// let mut model = Model::default();
@@ -47,7 +48,7 @@ use crate::start::{Before, begin, go_on};
 /// model.fix("base", vec![0, 1, 2]);
 /// model.loads.push(Load::gravity(tet, [0.0, 0.0, -9.81]));
 ///
-/// let mut simulation = Simulation::new(Part::explicit("tet", model, 0.1)?)?;
+/// let mut simulation = Simulation::new(ParticipantSetup::explicit("tet", model, 0.1)?)?;
 /// let start = simulation.state()?;
 /// simulation.run(0.1, |_| ())?;
 /// let down = simulation.frame()?.displacements("tet").unwrap()[3][2];
@@ -57,7 +58,7 @@ use crate::start::{Before, begin, go_on};
 /// # Ok::<(), pliant_sim::Failure>(())
 /// ```
 pub struct Simulation {
-    world: Arc<World>,
+    setup: Arc<Setup>,
     participants: Vec<Box<dyn Participant>>,
     /// Steps of each participant between two common instants.
     ratios: Vec<u64>,
@@ -82,51 +83,51 @@ pub struct Simulation {
 }
 
 impl Simulation {
-    /// At the start of a world.
+    /// Makes a simulation at the start of a setup.
     ///
     /// # Errors
-    /// If a stepper can't be made, or the world has no participants.
-    pub fn new(world: impl Into<Arc<World>>) -> Result<Self, Failure> {
-        let world = world.into();
-        let participants = world.parts.iter().map(begin).collect::<Result<Vec<_>, _>>()?;
+    /// If a stepper can't be made, or the setup has no participants.
+    pub fn new(setup: impl Into<Arc<Setup>>) -> Result<Self, Failure> {
+        let setup = setup.into();
+        let participants = setup.parts.iter().map(begin).collect::<Result<Vec<_>, _>>()?;
         if participants.is_empty() {
-            return Err(Failure::input(&"the world has no participants"));
+            return Err(Failure::input(&"the setup has no participants"));
         }
-        Self::of(world, participants, Between::default())
+        Self::of(setup, participants, Between::default())
     }
 
-    /// Makes a simulation that continues from a state of this world.
+    /// Makes a simulation that continues from a state of this setup.
     ///
     /// # Errors
-    /// If a stepper can't be made, or the state is of another world.
-    pub fn resumed(world: impl Into<Arc<World>>, state: State) -> Result<Self, Failure> {
-        let world = world.into();
-        state.check(&world)?;
-        let State(state, between) = state;
+    /// If a stepper can't be made, or the state is of another setup.
+    pub fn resumed(setup: impl Into<Arc<Setup>>, state: SimulationState) -> Result<Self, Failure> {
+        let setup = setup.into();
+        state.check(&setup)?;
+        let SimulationState(state, between) = state;
         let mut participants = Vec::new();
-        for (part, own) in world.parts.iter().zip(state) {
+        for (part, own) in setup.parts.iter().zip(state) {
             participants.push(resume(part, own)?);
         }
-        Self::of(world, participants, between)
+        Self::of(setup, participants, between)
     }
 
-    /// Makes a simulation that continues from a state of another world, with displacements, velocities and
-    /// the history of relaxing laws. `None` where this world has other meshes, solvers or number types.
+    /// Makes a simulation that continues from a state of another setup, with displacements, velocities and
+    /// the history of relaxing laws. `None` where this setup has other meshes, solvers or number types.
     ///
     /// # Errors
     /// If a stepper can't be made.
     pub fn continued(
-        world: impl Into<Arc<World>>,
-        State(state, between): State,
-        before: &World,
+        setup: impl Into<Arc<Setup>>,
+        SimulationState(state, between): SimulationState,
+        before: &Setup,
     ) -> Result<Option<Self>, Failure> {
-        let world = world.into();
-        let fits = between.fits(&world);
-        if state.is_empty() || [state.len(), before.parts.len()] != [world.parts.len(); 2] || !fits {
+        let setup = setup.into();
+        let fits = between.fits(&setup);
+        if state.is_empty() || [state.len(), before.parts.len()] != [setup.parts.len(); 2] || !fits {
             return Ok(None);
         }
         let mut participants = Vec::new();
-        for ((part, own), before) in world.parts.iter().zip(state).zip(&before.parts) {
+        for ((part, own), before) in setup.parts.iter().zip(state).zip(&before.parts) {
             if !same_mesh(before, part) {
                 return Ok(None);
             }
@@ -137,35 +138,35 @@ impl Simulation {
                 None => return Ok(None),
             }
         }
-        Self::of(world, participants, between).map(Some)
+        Self::of(setup, participants, between).map(Some)
     }
 
     fn of(
-        world: Arc<World>,
+        setup: Arc<Setup>,
         participants: Vec<Box<dyn Participant>>,
         between: Between,
     ) -> Result<Self, Failure> {
-        let ratios = world.ratios();
-        let nodes = world.parts.iter().map(|part| part.model.node_count() as u32);
+        let ratios = setup.ratios();
+        let nodes = setup.parts.iter().map(|part| part.model.node_count() as u32);
         let first_nodes = nodes.scan(0, |next, nodes| Some(std::mem::replace(next, *next + nodes))).collect();
         let hands = vec![Vec::new(); participants.len()];
         let mut order: Vec<usize> = (0..participants.len()).collect();
         // Of the same steps, one whose equations are solved goes last; but its coupled nodes go before their
         // hosts.
-        let solves = |part: usize| world.parts[part].method.solves_steps();
-        order.sort_by_key(|&part| (ratios[part], solves(part) == world.coupled_surfaces.is_empty()));
+        let solves = |part: usize| setup.parts[part].method.solves_steps();
+        order.sort_by_key(|&part| (ratios[part], solves(part) == setup.coupled_surfaces.is_empty()));
         let done = vec![0; participants.len()];
-        if !(world.ties.is_empty() || world.coupled_surfaces.is_empty()) {
+        if !(setup.ties.is_empty() || setup.coupled_surfaces.is_empty()) {
             return Err(Failure::input(
                 &"participants can be tied to each other or touch each other, but not both",
             ));
         }
-        let springs = Springs::new(&world.ties, &world.parts, between.ties)?;
+        let springs = Springs::new(&setup.ties, &setup.parts, between.ties)?;
         let meetings =
-            Meetings::new(&world.coupled_surfaces, &world.parts, &ratios, between.coupled_surfaces)?;
+            Meetings::new(&setup.coupled_surfaces, &setup.parts, &ratios, between.coupled_surfaces)?;
         let before = Vec::new();
         Ok(Self {
-            world,
+            setup,
             participants,
             ratios,
             first_nodes,
@@ -181,9 +182,9 @@ impl Simulation {
         })
     }
 
-    /// The world.
-    pub fn world(&self) -> &Arc<World> {
-        &self.world
+    /// The setup of the participants.
+    pub fn setup(&self) -> &Arc<Setup> {
+        &self.setup
     }
 
     /// Time of the common instant [s].
@@ -198,7 +199,7 @@ impl Simulation {
 
     /// Length [s] of the next step from one common instant to the next.
     pub fn step_length(&self) -> f64 {
-        self.world.step_from(self.time())
+        self.setup.step_from(self.time())
     }
 
     /// Steps to the next common instant; on a GPU takes as many steps as possible at once, up to `most`.
@@ -288,7 +289,7 @@ impl Simulation {
         if !self.evaluated {
             if !self.meetings.is_empty() {
                 self.before.clear();
-                let parts = self.participants.iter().zip(&self.world.parts);
+                let parts = self.participants.iter().zip(&self.setup.parts);
                 self.before.extend(parts.map(|(now, part)| OwnState {
                     snapshot: now.snapshot(),
                     clock: None,
@@ -297,7 +298,7 @@ impl Simulation {
             }
             if !(self.springs.is_empty() && self.meetings.is_empty()) {
                 self.springs.meet(&self.participants);
-                self.meetings.meet(&self.world.parts, &mut self.participants);
+                self.meetings.meet(&self.setup.parts, &mut self.participants);
                 self.done.fill(0);
                 for part in 0..self.participants.len() {
                     self.grip_part(part);
@@ -349,8 +350,9 @@ impl Simulation {
     fn can_stop_within(&self) -> bool {
         // States on a device would be read back before each common step.
         let in_memory = self.participants.iter().all(|own| own.stride() == 1);
-        let takes_long = |(part, ratio): (&Part, &u64)| part.method.takes_long() || (*ratio > 1 && in_memory);
-        self.stop.is_some() && self.world.parts.iter().zip(&self.ratios).any(takes_long)
+        let takes_long =
+            |(part, ratio): (&ParticipantSetup, &u64)| part.method.takes_long() || (*ratio > 1 && in_memory);
+        self.stop.is_some() && self.setup.parts.iter().zip(&self.ratios).any(takes_long)
     }
 
     /// Ends a common step of several steps of a participant where that was asked for.
@@ -402,9 +404,9 @@ impl Simulation {
             // are then.
             let first = self.done[part] == 0;
             if !first {
-                self.springs.settle(part, &self.world.parts);
+                self.springs.settle(part, &self.setup.parts);
             }
-            if !first || self.world.parts[part].method.solves_steps() {
+            if !first || self.setup.parts[part].method.solves_steps() {
                 self.grip_part(part);
             }
             let participant = &mut self.participants[part];
@@ -413,10 +415,10 @@ impl Simulation {
             }
             participant.advance(1, watch)?;
             self.done[part] += 1;
-            let ahead = ahead(&self.world.parts, &self.done, part, 0);
-            self.springs.after(part, &self.world.parts, &self.participants, ahead);
+            let ahead = ahead(&self.setup.parts, &self.done, part, 0);
+            self.springs.after(part, &self.setup.parts, &self.participants, ahead);
         }
-        (0..self.participants.len()).for_each(|part| self.springs.settle(part, &self.world.parts));
+        (0..self.participants.len()).for_each(|part| self.springs.settle(part, &self.setup.parts));
         Ok(())
     }
 
@@ -438,9 +440,9 @@ impl Simulation {
                 }
                 self.participants[part].advance(1, watch)?;
                 self.done[part] += 1;
-                self.meetings.after(part, &self.world.parts, &mut self.participants);
+                self.meetings.after(part, &self.setup.parts, &mut self.participants);
             }
-            if self.meetings.settle(pass, &self.world.parts, &self.participants) {
+            if self.meetings.settle(pass, &self.setup.parts, &self.participants) {
                 break;
             }
         }
@@ -460,7 +462,7 @@ impl Simulation {
     /// Lets hands and ties take hold of a participant for its next step; false if it knows no grips.
     fn grip_part(&mut self, part: usize) -> bool {
         let mut grips = self.hands[part].clone();
-        let ahead = ahead(&self.world.parts, &self.done, part, 1);
+        let ahead = ahead(&self.setup.parts, &self.done, part, 1);
         self.springs.before(part, &self.participants, ahead);
         self.springs.add_to(part, &mut grips);
         self.meetings.add_to(part, &mut grips);
@@ -500,125 +502,33 @@ impl Simulation {
     ///
     /// # Errors
     /// If a device fails.
-    pub fn state(&mut self) -> Result<State, Failure> {
+    pub fn state(&mut self) -> Result<SimulationState, Failure> {
         let mut state = self.motion()?;
         state.0.iter_mut().zip(&self.participants).for_each(|(own, now)| now.add_log(&mut own.snapshot));
         Ok(state)
     }
 
     /// The state without what participants note of their iterations.
-    fn motion(&mut self) -> Result<State, Failure> {
+    fn motion(&mut self) -> Result<SimulationState, Failure> {
         self.bring_back()?;
         Ok(self.snapshot())
     }
 
     /// Returns the state in ordinary memory, without the participants' notes of their iterations. For a GPU
     /// this is the state last read back.
-    pub fn snapshot(&self) -> State {
-        let parts = self.world.parts.iter().zip(&self.participants).enumerate();
+    pub fn snapshot(&self) -> SimulationState {
+        let parts = self.setup.parts.iter().zip(&self.participants).enumerate();
         let own = parts.map(|(index, (part, now))| {
             let snapshot = self.met().map_or_else(|| now.snapshot(), |met| met[index].snapshot.clone());
             OwnState { clock: now.clock(), snapshot, step: part.steps.step }
         });
-        State(own.collect(), self.between())
+        SimulationState(own.collect(), self.between())
     }
 
     /// The states at the instant before its forces were found, where participants touch each other and forces
     /// are found.
     fn met(&self) -> Option<&[OwnState]> {
         (self.evaluated && !self.meetings.is_empty()).then_some(&self.before[..])
-    }
-
-    /// Goes to an earlier or later state of this world. Hands let go; forces of [`push`](Self::push) stay.
-    ///
-    /// # Errors
-    /// If it is of another world, or a device fails. The simulation then stays as it was.
-    pub fn restore(&mut self, state: State) -> Result<(), Failure> {
-        state.check(&self.world)?;
-        self.go_back(state)?;
-        self.participants.iter_mut().for_each(|own| own.cut_log());
-        self.grip(&[]);
-        Ok(())
-    }
-
-    /// Goes back to a state that fits the world.
-    fn go_back(&mut self, State(parts, between): State) -> Result<(), Failure> {
-        let springs = Springs::new(&self.world.ties, &self.world.parts, between.ties)?;
-        let meetings = Meetings::new(
-            &self.world.coupled_surfaces,
-            &self.world.parts,
-            &self.ratios,
-            between.coupled_surfaces,
-        )?;
-        self.put_back(&parts, |_, _| true)?;
-        (self.springs, self.meetings, self.evaluated) = (springs, meetings, false);
-        Ok(())
-    }
-
-    /// Brings some participants back to states of their parts. Participants that can't go back are made anew.
-    /// Where one can't be made, nothing changes.
-    fn put_back(
-        &mut self,
-        states: &[OwnState],
-        chosen: impl Fn(&Self, usize) -> bool,
-    ) -> Result<(), Failure> {
-        let mut made = Vec::new();
-        for (part, state) in states.iter().enumerate() {
-            if chosen(self, part) && !self.participants[part].goes_back_to(&state.snapshot) {
-                made.push((part, resume(&self.world.parts[part], state.clone())?));
-            }
-        }
-        for (part, state) in states.iter().enumerate() {
-            if chosen(self, part) && self.participants[part].goes_back_to(&state.snapshot) {
-                self.participants[part].go_back(&state.snapshot, state.steps())?;
-            }
-        }
-        for (part, anew) in made {
-            let mut before = std::mem::replace(&mut self.participants[part], anew);
-            take_place_of(&mut self.participants[part], &mut before);
-            if let Some(flag) = &self.stop {
-                self.participants[part].stop_on(flag);
-            }
-            self.push_part(part);
-        }
-        Ok(())
-    }
-
-    /// Continues from the present state with other values (laws, loads, steps). Hands let go; forces of
-    /// [`push`](Self::push) stay. Returns false, and nothing changes, where the other world has other meshes,
-    /// solvers or number types.
-    ///
-    /// # Errors
-    /// Errors of [`state`](Self::state), or if a stepper can't be made. The simulation then stays as it was.
-    pub fn exchange(&mut self, world: impl Into<Arc<World>>) -> Result<bool, Failure> {
-        let state = self.state()?;
-        match Self::continued(world, state, &self.world)? {
-            Some(other) => {
-                let mut before = std::mem::replace(self, other);
-                for (own, before) in self.participants.iter_mut().zip(&mut before.participants) {
-                    take_place_of(own, before);
-                }
-                if let Some(flag) = &before.stop {
-                    self.stop_on(flag);
-                }
-                self.pushed = before.pushed;
-                (0..self.participants.len()).for_each(|part| self.push_part(part));
-                Ok(true)
-            }
-            None => Ok(false),
-        }
-    }
-
-    /// The state of each participant as bytes of a checkpoint; with ties or contacts between participants,
-    /// theirs after them.
-    ///
-    /// # Errors
-    /// If a device fails, or a state can't be encoded.
-    pub fn encode(&mut self) -> Result<Vec<Vec<u8>>, Failure> {
-        let state = self.state()?;
-        state
-            .encode()
-            .map_err(|error| Failure::new(FailureKind::Output, error.to_string(), Some(self.time())))
     }
 
     fn between(&self) -> Between {
@@ -629,7 +539,7 @@ impl Simulation {
         self.participants.iter_mut().try_for_each(|participant| participant.bring_back())
     }
 
-    /// The participants as observers read them, in the order of the world, at the instant last evaluated.
+    /// The participants as observers read them, in the order of the setup, at the instant last evaluated.
     pub fn instants(&self) -> impl Iterator<Item = &dyn Instant> {
         self.participants.iter().map(|participant| participant.as_ref() as &dyn Instant)
     }
@@ -678,7 +588,7 @@ impl Simulation {
     /// The place of a node at rest [m].
     pub fn rest(&self, node: u32) -> [f64; 3] {
         let (part, node) = self.locate(node);
-        self.world.parts[part].model.rest[node as usize]
+        self.setup.parts[part].model.rest[node as usize]
     }
 
     /// Takes hold of points: these grips and no others act from the next evaluation on. False where a stepper
@@ -705,7 +615,7 @@ impl Simulation {
     /// If there are not as many forces as nodes, a force is not finite, or a stepper takes none, as on a GPU.
     /// No force is then replaced.
     pub fn push(&mut self, forces: &[Vector<f64>]) -> Result<(), Failure> {
-        let nodes: usize = self.world.parts.iter().map(|part| part.model.node_count()).sum();
+        let nodes: usize = self.setup.parts.iter().map(|part| part.model.node_count()).sum();
         if !forces.is_empty() && forces.len() != nodes {
             let given = forces.len();
             return Err(Failure::input(&format_args!(
@@ -715,7 +625,7 @@ impl Simulation {
         if let Some(node) = forces.iter().position(|force| !force.iter().all(|f| f.is_finite())) {
             return Err(Failure::input(&format_args!("the force on node {node} is not finite")));
         }
-        if !forces.is_empty() && !self.world.parts.iter().all(|part| part.method.takes_forces()) {
+        if !forces.is_empty() && !self.setup.parts.iter().all(|part| part.method.takes_forces()) {
             let remedy =
                 "forces on nodes act on the CPU only: choose `device = \"cpu\"`, or hold nodes by grips";
             return Err(Failure::new(FailureKind::Device, remedy.to_owned(), Some(self.time())));
@@ -729,7 +639,7 @@ impl Simulation {
     /// Gives a participant what its nodes are pushed with.
     fn push_part(&mut self, part: usize) {
         let first = (self.first_nodes[part] as usize).min(self.pushed.len());
-        let end = (first + self.world.parts[part].model.node_count()).min(self.pushed.len());
+        let end = (first + self.setup.parts[part].model.node_count()).min(self.pushed.len());
         self.participants[part].push(&self.pushed[first..end]);
     }
 
@@ -758,7 +668,7 @@ impl Simulation {
             (own == part).then_some((node, weight))
         });
         let nodes: Vec<_> = nodes.collect::<Option<_>>()?;
-        Some((part, Grip { nodes: self.world.parts[part].model.resolved(&nodes), ..grip.clone() }))
+        Some((part, Grip { nodes: self.setup.parts[part].model.resolved(&nodes), ..grip.clone() }))
     }
 }
 
@@ -774,7 +684,7 @@ impl Simulation {
 }
 
 /// Makes a participant that continues from a state of its part.
-fn resume(part: &Part, own: OwnState) -> Result<Box<dyn Participant>, Failure> {
+fn resume(part: &ParticipantSetup, own: OwnState) -> Result<Box<dyn Participant>, Failure> {
     let steps = own.steps().map(|(clock, step)| Before { clock, step, model: None });
     go_on(part, own.snapshot, steps)?.ok_or_else(|| Failure::input(&"the state is of another model"))
 }
@@ -788,14 +698,19 @@ fn take_place_of(own: &mut Box<dyn Participant>, before: &mut Box<dyn Participan
 }
 
 /// Time [s] that others, each by its index, are ahead of a participant after a number of further steps.
-fn ahead<'a>(parts: &'a [Part], done: &'a [u64], part: usize, more: u64) -> impl Fn(usize) -> f64 + 'a {
+fn ahead<'a>(
+    parts: &'a [ParticipantSetup],
+    done: &'a [u64],
+    part: usize,
+    more: u64,
+) -> impl Fn(usize) -> f64 + 'a {
     let at = move |part: usize, more: u64| (done[part] + more) as f64 * parts[part].steps.step;
     move |other| at(other, 0) - at(part, more)
 }
 
 /// True if two participants have the same nodes and cells.
-fn same_mesh(a: &Part, b: &Part) -> bool {
-    let shells = |part: &Part| part.method.bodies().map(|bodies| bodies.model.rest.len());
+fn same_mesh(a: &ParticipantSetup, b: &ParticipantSetup) -> bool {
+    let shells = |part: &ParticipantSetup| part.method.bodies().map(|bodies| bodies.model.rest.len());
     a.model.rest == b.model.rest && shells(a) == shells(b) && meshes(&a.model) == meshes(&b.model)
 }
 

@@ -7,7 +7,7 @@ use pliant_mechanics::model::Enclosed;
 use super::Simulation;
 use crate::failure::Failure;
 use crate::instant::Instant;
-use crate::part::Part;
+use crate::participant_setup::ParticipantSetup;
 use crate::solver::LoadStepProgress;
 
 /// Looks at a run ([`Simulation::observe`]) and changes nothing.
@@ -45,7 +45,7 @@ use crate::solver::LoadStepProgress;
 /// # model.add_solid(Solid::new(tet, Material::elastic(law, 1000.0), cells));
 /// # model.fix("base", vec![0, 1, 2]);
 /// # model.loads.push(Load::gravity(tet, [0.0, 0.0, -9.81]));
-/// # let part = pliant_sim::Part::explicit("tet", model, 0.5)?;
+/// # let part = pliant_sim::ParticipantSetup::explicit("tet", model, 0.5)?;
 ///
 /// let mut height = Height { schedule: Schedule::new(0.1), samples: Vec::new() };
 /// Simulation::new(part)?.observe(0.5, &mut height)?;
@@ -97,8 +97,8 @@ impl<'a> Frame<'a> {
     }
 
     /// The participants.
-    pub fn parts(&self) -> impl Iterator<Item = (&'a Part, &'a dyn Instant)> {
-        self.simulation.world.parts.iter().zip(self.simulation.instants())
+    pub fn parts(&self) -> impl Iterator<Item = (&'a ParticipantSetup, &'a dyn Instant)> {
+        self.simulation.setup.parts.iter().zip(self.simulation.instants())
     }
 
     /// Energies of all participants together [J].

@@ -4,17 +4,17 @@ use pliant_explicit::Clock;
 use pliant_mechanics::count::is_time;
 use serde::{Deserialize, Serialize};
 
-use super::World;
+use super::Setup;
 use crate::coupled_surfaces::CouplingMemory;
 use crate::failure::Failure;
-use crate::part::Part;
+use crate::participant_setup::ParticipantSetup;
 use crate::penalty::TieMemory;
 use crate::snapshot::Snapshot;
 
 /// The state of a simulation between two steps: a snapshot with all data that another simulation needs to
 /// continue.
 #[derive(Clone, Debug)]
-pub struct State(pub(super) Vec<OwnState>, pub(super) Between);
+pub struct SimulationState(pub(super) Vec<OwnState>, pub(super) Between);
 
 /// State of ties and contacts between participants that a restart needs.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -29,8 +29,8 @@ impl Between {
         self.ties.is_empty() && self.coupled_surfaces.is_empty()
     }
 
-    pub(super) fn fits(&self, world: &World) -> bool {
-        self.ties.fits(&world.ties) && self.coupled_surfaces.fits(&world.coupled_surfaces)
+    pub(super) fn fits(&self, setup: &Setup) -> bool {
+        self.ties.fits(&setup.ties) && self.coupled_surfaces.fits(&setup.coupled_surfaces)
     }
 }
 
@@ -50,7 +50,7 @@ impl OwnState {
     }
 }
 
-impl State {
+impl SimulationState {
     /// The state of each participant as bytes, as [`Simulation::encode`](crate::Simulation::encode) has it.
     ///
     /// # Errors
@@ -71,36 +71,36 @@ impl State {
         self.0.first().map_or(0.0, |own| own.snapshot.at().0)
     }
 
-    /// Halves the steps of all participants of its world that [cut theirs](World::cuts_steps) from here on.
+    /// Halves the steps of all participants of its setup that [cut theirs](Setup::cuts_steps) from here on.
     /// False if no participant does, or after the steps were halved
     /// [three times](pliant_explicit::stability::MOST_HALVINGS).
-    pub fn halve_steps(&mut self, world: &World) -> bool {
-        let mut cut = self.0.iter_mut().zip(&world.parts).filter(|(_, part)| part.cuts_steps()).peekable();
+    pub fn halve_steps(&mut self, setup: &Setup) -> bool {
+        let mut cut = self.0.iter_mut().zip(&setup.parts).filter(|(_, part)| part.cuts_steps()).peekable();
         cut.peek().is_some() && cut.all(|(own, _)| own.snapshot.halve_steps())
     }
 
-    /// Checks that the state belongs to a world.
+    /// Checks that the state belongs to a setup.
     ///
     /// # Errors
     /// If it does not.
-    pub(super) fn check(&self, world: &World) -> Result<(), Failure> {
+    pub(super) fn check(&self, setup: &Setup) -> Result<(), Failure> {
         let Self(parts, between) = self;
-        let is_own = parts.len() == world.parts.len()
-            && between.fits(world)
-            && parts.iter().zip(&world.parts).all(|(own, part)| own.snapshot.fits(part));
+        let is_own = parts.len() == setup.parts.len()
+            && between.fits(setup)
+            && parts.iter().zip(&setup.parts).all(|(own, part)| own.snapshot.fits(part));
         if is_own { Ok(()) } else { Err(Failure::input(&"the state is of another model")) }
     }
 
     /// The state whose participants were [encoded](crate::Simulation::encode); `None` where these bytes are
-    /// none of this world.
-    pub fn decode<B: AsRef<[u8]>>(world: &World, bytes: &[B]) -> Option<Self> {
-        let (participants, between) = bytes.split_at_checked(world.parts.len())?;
+    /// none of this setup.
+    pub fn decode<B: AsRef<[u8]>>(setup: &Setup, bytes: &[B]) -> Option<Self> {
+        let (participants, between) = bytes.split_at_checked(setup.parts.len())?;
         let between: Between = match between {
             [] => Between::default(),
             [between] => postcard::from_bytes(between.as_ref()).ok()?,
             _ => return None,
         };
-        let of = |(part, bytes): (&Part, &B)| {
+        let of = |(part, bytes): (&ParticipantSetup, &B)| {
             let (steps, bytes) = postcard::take_from_bytes::<Option<(Clock, f64)>>(bytes.as_ref()).ok()?;
             let snapshot = Snapshot::decode(part, bytes)?;
             let done = snapshot.at().1;
@@ -119,7 +119,7 @@ impl State {
                 step: steps.map_or(part.steps.step, |of| of.1),
             })
         };
-        let parts = world.parts.iter().zip(participants).map(of).collect::<Option<_>>()?;
-        between.fits(world).then_some(Self(parts, between))
+        let parts = setup.parts.iter().zip(participants).map(of).collect::<Option<_>>()?;
+        between.fits(setup).then_some(Self(parts, between))
     }
 }

@@ -18,7 +18,7 @@ use pliant_picture::{Mark, PointForce, Subject};
 use pliant_run::Live;
 use pliant_scene::World;
 use pliant_sim::gpu::DevicePoints;
-use pliant_sim::{Failure, State, StopFlag};
+use pliant_sim::{Failure, SimulationState, StopFlag};
 
 use self::player::play;
 use crate::followed::FollowedPoint;
@@ -183,7 +183,10 @@ pub struct Session {
 ///
 /// # Errors
 /// If a stepper can't be made.
-pub(crate) fn enter(world: &World, from: Option<(World, Option<State>)>) -> Result<(Live, bool), String> {
+pub(crate) fn enter(
+    world: &World,
+    from: Option<(World, Option<SimulationState>)>,
+) -> Result<(Live, bool), String> {
     let told = |failure: Failure| failure.message;
     let world = Arc::new(world.clone());
     if let Some((before, Some(snapshot))) = from

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use pliant_format::tables::ViewTable;
 use pliant_run::Column;
 use pliant_scene::World;
-use pliant_sim::{State, StopFlag};
+use pliant_sim::{SimulationState, StopFlag};
 
 use super::{FRAME, WRITTEN};
 use crate::device::Seen;
@@ -110,7 +110,7 @@ pub(super) struct Playback {
 pub(super) struct Former {
     pub(super) world: World,
     pub(super) numbers: Vec<Number>,
-    pub(super) state: Option<State>,
+    pub(super) state: Option<SimulationState>,
     pub(super) steps: u64,
     pub(super) hold: Hold,
     /// Moves and breaks that were recorded.
@@ -173,7 +173,7 @@ impl Playback {
     }
 
     /// Returns to a run before its numbers were changed. Gives the state to continue from.
-    pub(super) fn refuse(&mut self, former: &Former, reason: &str) -> Option<State> {
+    pub(super) fn refuse(&mut self, former: &Former, reason: &str) -> Option<SimulationState> {
         (self.steps, self.owed, self.hold) = (former.steps, 0, former.hold.clone());
         self.numbers.clone_from(&former.numbers);
         (self.failure, self.refused, self.change) = (None, None, None);

@@ -15,13 +15,13 @@ use pliant_picture::{
 use pliant_run::{Column, Live};
 use pliant_scene::World;
 use pliant_sim::gpu::{DevicePoints, PointValue};
-use pliant_sim::{Failure, State, StopFlag};
+use pliant_sim::{Failure, StopFlag};
 
 use super::playback::{Former, Playback};
 use super::{BEHIND, FRAME, Frame, Order, SAMPLED, enter};
 use crate::device::point_value;
 use crate::followed::Followed;
-use crate::hand::{Hand, Hold, Point, Which};
+use crate::hand::{Hand, Point, Which};
 use crate::marks::marks;
 use crate::recording::{Break, Done, Recording, Surface};
 use crate::samples::{HAND, SECOND_HAND, Sample};
@@ -438,7 +438,7 @@ impl<'s> Player<'s> {
     /// the failure, the steps are halved there. Otherwise the hands let go there, or the run stops.
     pub(super) fn go_back(&mut self, failure: Failure) {
         let broken = self.live.simulation.time();
-        let world = Arc::clone(self.live.simulation.world());
+        let world = Arc::clone(self.live.simulation.setup());
         let untouched = world.shorter_steps_may_avoid(&failure).then(|| self.sound.untouched()).flatten();
         let halved = untouched.and_then(|sound| sound.state.halve_steps(&world).then(|| sound.clone()));
         let message = failure.message;

@@ -4,7 +4,7 @@ use eframe::egui;
 use pliant_format::tables::{BodyModel, ColourBy, Component, FieldName, Labels, Nothing, SolverName};
 use pliant_geometry::Vector3;
 use pliant_picture::{Background, ColourMap, Texture};
-use pliant_scene::Part;
+use pliant_scene::PlannedParticipant;
 
 use super::App;
 use super::told::Told;
@@ -234,8 +234,9 @@ impl App {
     }
 
     fn hand(&mut self, ui: &mut egui::Ui) {
-        let is_relaxed =
-            |part: &Part| part.scene.run.solver == SolverName::QuasiStatic && part.built.implicit.is_none();
+        let is_relaxed = |part: &PlannedParticipant| {
+            part.scene.run.solver == SolverName::QuasiStatic && part.built.implicit.is_none()
+        };
         if self.world.participants.iter().any(is_relaxed) {
             ui.weak("the solver `quasi-static` does not support pulling by hand; use `static` or `implicit`");
             return;

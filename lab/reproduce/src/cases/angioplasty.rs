@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 use nalgebra::{Vector2, Vector3};
 use pliant_implicit::AssemblySolver;
-use pliant_implicit::{Assembly, ContactModel, State, StaticSettings, Statics};
+use pliant_implicit::{Assembly, AssemblyState, ContactModel, StaticSettings, Statics};
 use pliant_mechanics::curve::{Curve as LoadCurve, Shape as CurveShape};
 use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
 use pliant_mechanics::model::{Cells, Constraint, Material, Motion, Solid};
@@ -191,7 +191,7 @@ impl Vessel {
     }
 
     /// Mean radius [m] of a layer at the throat.
-    fn radius(&self, state: &State, layer: u32) -> f64 {
+    fn radius(&self, state: &AssemblyState, layer: u32) -> f64 {
         let radius = |i: u32| state.position[self.node([i, layer, 0]) as usize].xy().norm();
         (0..=self.around).map(radius).sum::<f64>() / f64::from(self.around + 1)
     }
@@ -243,7 +243,7 @@ pub fn widened(divisions: Divisions, young: f64, radii: &[f64]) -> Result<Vec<Wi
     });
     let settings = StaticSettings { iterations: 200, ..StaticSettings::default() };
     let mut solver = Statics::new(vessel.model.clone(), settings)?;
-    let mut state = State::at_rest(&vessel.model);
+    let mut state = AssemblyState::at_rest(&vessel.model);
     let start = vessel.radius(&state, outer);
     let mut found = Vec::new();
     for step in 1..=radii.len() {

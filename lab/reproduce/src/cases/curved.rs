@@ -5,7 +5,7 @@
 
 use nalgebra::{SMatrix, SVector, UnitQuaternion};
 use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3};
-use pliant_implicit::{Assembly, CurvedSurface, Picture, State};
+use pliant_implicit::{Assembly, AssemblyState, CurvedSurface, Picture};
 use pliant_meshing::{DEFAULT_CELL_LIMIT, Pattern, Sheet, sphere};
 use pliant_shells::element::Formulation;
 use pliant_shells::{EdgeRule, Patch, Place};
@@ -78,7 +78,7 @@ fn triangle_mesh(points: Vec<Vector3>, triangles: impl IntoIterator<Item = [u32;
 }
 
 /// Points of a picture on flat facets.
-fn flat(model: &Assembly, state: &State, place: &Place) -> Vector3 {
+fn flat(model: &Assembly, state: &AssemblyState, place: &Place) -> Vector3 {
     let nodes = model.facets[place.facet as usize].nodes;
     nodes.iter().zip(place.weights).map(|(&node, w)| state.position[node as usize] * w).sum()
 }
@@ -194,7 +194,7 @@ fn patch() -> Result<Findings, CaseError> {
     model_mesh.point_sets.clear();
     let specimen = Specimen::new(model_mesh, [1e6, 0.3], 0.01, Formulation::default())?;
     let model = &specimen.model;
-    let mut state = State::at_rest(model);
+    let mut state = AssemblyState::at_rest(model);
     let turns = [[0.15, -0.30, 0.0], [0.10, 0.35, 0.0], [-0.40, 0.05, 0.0]];
     for (rotation, turn) in state.rotation.iter_mut().zip(turns) {
         *rotation = UnitQuaternion::from_scaled_axis(Vector3::from(turn));
@@ -268,7 +268,7 @@ fn layers() -> Result<Findings, CaseError> {
     )?;
     let specimen = Specimen::new(bowl, [1e6, 0.3], 0.01, Formulation::default())?;
     let model = &specimen.model;
-    let state = State::at_rest(model);
+    let state = AssemblyState::at_rest(model);
     let surface = CurvedSurface::new(model, EdgeRule::Arc);
     let Picture { places, triangles, .. } = surface.picture(model, 6);
     let point = |place: &Place| surface.patch(model, &state, place.facet).point(place.weights);
@@ -336,7 +336,7 @@ fn layers() -> Result<Findings, CaseError> {
 /// A sphere of shells under an affine motion of its nodes; the normals rotate with the ellipsoid's normals.
 struct Ellipsoid {
     model: Assembly,
-    state: State,
+    state: AssemblyState,
     axes: Vector3,
 }
 
@@ -346,7 +346,7 @@ impl Ellipsoid {
         // Curved by the sphere's own normals, not by means of facets.
         let model = Specimen::new(mesh, [1e6, 0.3], 0.01, Formulation::default())?.model;
         let axes = Vector3::from(axes);
-        let mut state = State::at_rest(&model);
+        let mut state = AssemblyState::at_rest(&model);
         for ((x, rotation), rest) in state.position.iter_mut().zip(&mut state.rotation).zip(model.places()) {
             *x = rest.component_mul(&axes);
             let normal = rest.component_div(&axes);

@@ -5,7 +5,7 @@ use pliant_geometry::Mesh;
 use pliant_mechanics::load::LoadKind;
 use pliant_meshing::{Pattern, Sheet};
 use pliant_shells::element::{Bending, Formulation, Membrane};
-use pliant_sim::{Frame, Part, Simulation, World};
+use pliant_sim::{Frame, ParticipantSetup, Setup, Simulation};
 
 use crate::case::{Case, CaseError, Correction, Findings, Row};
 use crate::plot::{Curve, Key, Pen, Plot};
@@ -105,11 +105,11 @@ pub fn deflections(loads: &[f64]) -> Result<Vec<f64>, CaseError> {
     let centre = plate.node(0.5 * SIDE, 0.5 * SIDE, 0.0) as usize;
     let ends: Vec<f64> = loads.iter().map(|load| load / 5.0).collect();
     let until = ends.last().copied().unwrap_or(0.0);
-    let mut part = Part::equilibria("plate", plate.model, until, loads.len() as u64);
+    let mut part = ParticipantSetup::equilibria("plate", plate.model, until, loads.len() as u64);
     part.steps.ends = Some(ends);
     let mut found = Vec::new();
     let at_centre = |frame: &Frame<'_>| frame.parts().map(|(_, now)| now.displacement(centre)[2]).next();
-    Simulation::new(World::new(vec![part]))?.run(until, |frame| found.extend(at_centre(frame)))?;
+    Simulation::new(Setup::new(vec![part]))?.run(until, |frame| found.extend(at_centre(frame)))?;
     // The first instant is at rest.
     Ok(found.split_off(1))
 }

@@ -6,7 +6,7 @@
 use pliant_bench::{SHELL_STEP, ShellRun, tube};
 use pliant_geometry::Vector3;
 use pliant_implicit::AssemblySolver;
-use pliant_implicit::{Assembly, DynamicSettings, Phases, Shell, State, StaticSettings, Statics};
+use pliant_implicit::{Assembly, AssemblyState, DynamicSettings, Phases, Shell, StaticSettings, Statics};
 use pliant_linear::{LinearSolver, Preconditioner};
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::model::{Constraint, Motion};
@@ -103,7 +103,7 @@ fn hexagon() -> Result<f64, CaseError> {
     let mut solver = Statics::new(model.clone(), StaticSettings::default())?;
     for _ in 0..50 {
         let before = solver.phases();
-        solver.linear(&State::at_rest(&model), 1.0)?;
+        solver.linear(&AssemblyState::at_rest(&model), 1.0)?;
         let after = solver.phases();
         times.push((after.preparation + after.solution - before.preparation - before.solution).as_secs_f64());
     }
@@ -166,7 +166,7 @@ fn compute() -> Result<Findings, CaseError> {
         .map(|settings| ShellRun::measure(800, settings, None, [0, 19]));
     let (loose, exact) = (loose?.last, exact?.last);
     let tube = tube(800)?;
-    let rest = State::at_rest(&tube).position;
+    let rest = AssemblyState::at_rest(&tube).position;
     let norm =
         |of: &dyn Fn(usize) -> Vector3| (0..rest.len()).map(|n| of(n).norm_squared()).sum::<f64>().sqrt();
     let off = norm(&|n| loose.position[n] - exact.position[n]) / norm(&|n| exact.position[n] - rest[n]);

@@ -17,7 +17,7 @@ use pliant_gpu::{Design, Device, StepFailure};
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::LoadKind;
 use pliant_mechanics::model::{Averaging, Body, Cells, Constraint, Model, Motion, Solid};
-use pliant_mechanics::prony::{Part, Prony, PronyTerm, PronyUpdate};
+use pliant_mechanics::prony::{Prony, PronyPart, PronyTerm, PronyUpdate};
 use serde_json::json;
 
 use crate::support;
@@ -119,9 +119,9 @@ fn relaxation_of_each_part_and_both_by_both_updates() {
     let Some(device) = support::device() else { return };
     let term = |part, weight, time| PronyTerm { part, weight, time };
     let terms = [
-        term(Part::Isochoric, 0.3, 0.05),
-        term(Part::Isochoric, 0.2, 0.4),
-        term(Part::Volumetric, 0.25, 0.1),
+        term(PronyPart::Isochoric, 0.3, 0.05),
+        term(PronyPart::Isochoric, 0.2, 0.4),
+        term(PronyPart::Volumetric, 0.25, 0.1),
     ];
     let cases = [
         ("three terms", &terms[..], PronyUpdate::BackwardEuler),
@@ -204,7 +204,8 @@ fn deterministic_designs_give_the_same_bits_however_the_steps_are_divided() {
 
 fn relaxing_cube(element: &str) -> Model {
     let mut material = elastic(neo_hookean());
-    let terms = [Part::Isochoric, Part::Volumetric].map(|part| PronyTerm { part, weight: 0.3, time: 0.1 });
+    let terms =
+        [PronyPart::Isochoric, PronyPart::Volumetric].map(|part| PronyTerm { part, weight: 0.3, time: 0.1 });
     material.prony = Prony::new(&terms, PronyUpdate::Exact).unwrap();
     let mut model = moved_cube(element, material);
     model.bodies[0].damping = 3.0;

@@ -14,7 +14,7 @@ use pliant_mechanics::grip::Grip;
 use pliant_mechanics::load::LoadKind;
 use pliant_mechanics::mapping::Weights;
 use pliant_mechanics::model::{Averaging, Cells, Constraint, Material, Model, Motion, Solid};
-use pliant_mechanics::prony::{Part, Prony, PronyTerm, PronyUpdate};
+use pliant_mechanics::prony::{Prony, PronyPart, PronyTerm, PronyUpdate};
 use pliant_mechanics::tensor::{Vector, cross, dot, sub};
 use serde_json::json;
 
@@ -255,7 +255,8 @@ fn a_cube_with_bars_falls_onto_a_slope() {
 
 fn relaxing() -> Model {
     let mut material = elastic(neo_hookean());
-    let terms = [Part::Isochoric, Part::Volumetric].map(|part| PronyTerm { part, weight: 0.3, time: 0.1 });
+    let terms =
+        [PronyPart::Isochoric, PronyPart::Volumetric].map(|part| PronyTerm { part, weight: 0.3, time: 0.1 });
     material.prony = Prony::new(&terms, PronyUpdate::Exact).unwrap();
     barred(tied_blocks("tet4", "hex8", material))
 }

@@ -8,7 +8,7 @@ use pliant_mechanics::load::{Load, LoadKind};
 use super::{Attempt, Statics, Step};
 use crate::model::assembly::Assembly;
 use crate::model::error::SolveError;
-use crate::model::state::State;
+use crate::model::state::AssemblyState;
 
 impl Statics {
     /// The next equilibrium under a control, which finds the factor of the controlled loads. Other loads and
@@ -17,7 +17,12 @@ impl Statics {
     /// # Errors
     /// If no load is controlled, the controlled component is held, a balloon is open, or no equilibrium is
     /// found. The state then is unchanged.
-    pub fn control(&mut self, state: &mut State, control: Control, until: f64) -> Result<Step, SolveError> {
+    pub fn control(
+        &mut self,
+        state: &mut AssemblyState,
+        control: Control,
+        until: f64,
+    ) -> Result<Step, SolveError> {
         self.attempts.clear();
         if !self.system.model.loads.iter().any(|load| load.controlled) {
             return Err(SolveError::Impossible("no load is marked as controlled"));
@@ -39,7 +44,7 @@ impl Statics {
     }
 
     /// Two halves of what a control prescribes from a state on.
-    pub(super) fn halves(&self, control: Control, state: &State) -> [Control; 2] {
+    pub(super) fn halves(&self, control: Control, state: &AssemblyState) -> [Control; 2] {
         match control {
             Control::Displacement { node, component, by } => {
                 [Control::Displacement { node, component, by: 0.5 * by }; 2]
@@ -53,7 +58,12 @@ impl Statics {
     }
 
     /// Difference of the controlled quantity from its target (squared for an arc length); sets its gradient.
-    pub(super) fn constraint(&mut self, control: Control, state: &State, start: &State) -> f64 {
+    pub(super) fn constraint(
+        &mut self,
+        control: Control,
+        state: &AssemblyState,
+        start: &AssemblyState,
+    ) -> f64 {
         self.gradient.fill(0.0);
         match control {
             Control::Displacement { node, component, by } => {
@@ -166,7 +176,7 @@ pub enum Control {
 }
 
 /// The volume [m³] that the facets of controlled pressures enclose.
-pub(super) fn controlled_volume(model: &Assembly, state: &State) -> f64 {
+pub(super) fn controlled_volume(model: &Assembly, state: &AssemblyState) -> f64 {
     let volume = |load: &Load| match &load.kind {
         LoadKind::ShellPressure { facets, .. } => model.enclosed_volume(facets, &state.position),
         _ => 0.0,

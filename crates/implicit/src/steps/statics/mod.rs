@@ -19,7 +19,7 @@ pub use self::control::Control;
 pub use self::held::check_held;
 use crate::model::assembly::Assembly;
 use crate::model::error::SolveError;
-use crate::model::state::State;
+use crate::model::state::AssemblyState;
 use crate::steps::descent::{Contacting, Limits, Vectors, descend};
 use crate::steps::limits::within_limits;
 use crate::steps::solver::{AssemblySolver, Attempted};
@@ -192,7 +192,7 @@ impl Statics {
     ///
     /// # Errors
     /// If the stiffness is singular or conjugate gradients fail.
-    pub fn linear(&mut self, state: &State, time: f64) -> Result<Vec<[f64; 6]>, SolveError> {
+    pub fn linear(&mut self, state: &AssemblyState, time: f64) -> Result<Vec<[f64; 6]>, SolveError> {
         self.begin(state, time);
         self.system.prescribed(state.time, time, &mut self.pending);
         self.system.begin_step(&state.history, time - state.time);
@@ -207,7 +207,7 @@ impl Statics {
     }
 
     /// Begins a load step to a time [s]. In the first one comes in what the state is off its curves.
-    fn begin(&mut self, state: &State, until: f64) {
+    fn begin(&mut self, state: &AssemblyState, until: f64) {
         if std::mem::take(&mut self.fresh) {
             self.system.catch_up(state, until);
         }
@@ -218,7 +218,7 @@ impl Statics {
     /// # Errors
     /// If a step fails as often as it may be halved; the state then is at the last equilibrium found on the
     /// way.
-    pub fn solve(&mut self, state: &mut State, until: f64) -> Result<Step, SolveError> {
+    pub fn solve(&mut self, state: &mut AssemblyState, until: f64) -> Result<Step, SolveError> {
         self.attempts.clear();
         let mut done = Step::default();
         let mut size = until - state.time;
@@ -254,7 +254,7 @@ impl Statics {
     /// most.
     fn halved(
         &mut self,
-        state: &mut State,
+        state: &mut AssemblyState,
         control: Control,
         until: f64,
         halvings: usize,
@@ -283,7 +283,12 @@ impl Statics {
     }
 
     /// Newton's method from a state, kept with the other attempts.
-    fn newton(&mut self, state: &mut State, time: f64, control: Option<Control>) -> Result<Step, Attempt> {
+    fn newton(
+        &mut self,
+        state: &mut AssemblyState,
+        time: f64,
+        control: Option<Control>,
+    ) -> Result<Step, Attempt> {
         self.attempts.push(Attempted { time, ..Attempted::default() });
         let result = self.iterate(state, time, control);
         if let Some(attempt) = self.attempts.last_mut() {
@@ -292,7 +297,12 @@ impl Statics {
         result
     }
 
-    fn iterate(&mut self, state: &mut State, time: f64, control: Option<Control>) -> Result<Step, Attempt> {
+    fn iterate(
+        &mut self,
+        state: &mut AssemblyState,
+        time: f64,
+        control: Option<Control>,
+    ) -> Result<Step, Attempt> {
         let start = state.clone();
         self.system.prescribed(state.time, time, &mut self.pending);
         self.system.begin_step(&start.history, time - start.time);
@@ -313,7 +323,7 @@ impl Statics {
     /// [`iterate`](Self::iterate) without contact; the negative pivots of the last stiffness.
     fn iterate_without_contact(
         &mut self,
-        state: &mut State,
+        state: &mut AssemblyState,
         time: f64,
         control: Option<Control>,
         residuals: &mut Vec<f64>,
@@ -370,7 +380,7 @@ impl Statics {
     /// [`iterate`](Self::iterate) in contact.
     fn iterate_in_contact(
         &mut self,
-        state: &mut State,
+        state: &mut AssemblyState,
         time: f64,
         control: Option<Control>,
     ) -> Result<Step, Attempt> {
@@ -421,7 +431,7 @@ impl Statics {
     }
 
     /// Finds loads less internal forces on the free components. Returns the norm and its tolerance [N].
-    fn find_residual(&mut self, state: &State) -> (f64, f64) {
+    fn find_residual(&mut self, state: &AssemblyState) -> (f64, f64) {
         let system = &mut self.system;
         for (load, controlled) in system.forces.external.iter_mut().zip(&system.forces.controlled) {
             *load += state.load_factor * controlled;
@@ -482,7 +492,7 @@ impl Statics {
 
     /// Halves the last increment up to three times while the residual along it, |Δ·r|, is far above what it
     /// was.
-    fn shorten(&mut self, state: &mut State, time: f64) -> Result<(), Attempt> {
+    fn shorten(&mut self, state: &mut AssemblyState, time: f64) -> Result<(), Attempt> {
         let before = dot(&self.solution, &self.residual).abs();
         let mut left = 1.0;
         for _ in 0..3 {
@@ -533,11 +543,11 @@ impl Contacting for Statics {
         Vectors { system, pending, increment, residual, solution }
     }
 
-    fn evaluate(&mut self, state: &State, time: f64, tangent: bool) -> Result<(), SolveError> {
+    fn evaluate(&mut self, state: &AssemblyState, time: f64, tangent: bool) -> Result<(), SolveError> {
         self.system.evaluate(state, time, tangent.then_some(&self.pending[..]))
     }
 
-    fn find_residual(&mut self, state: &State) -> (f64, f64) {
+    fn find_residual(&mut self, state: &AssemblyState) -> (f64, f64) {
         Self::find_residual(self, state)
     }
 

@@ -92,7 +92,7 @@ fn stiffness_is_the_change_of_forces(model: Assembly, unknowns: usize) {
     let model = Arc::new(model);
     let mut system = System::new(Arc::clone(&model), LinearSolver::Direct).unwrap();
     let mut random = Random::new(3);
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     let still = vec![0.0; 6 * model.rest.len()];
     system.evaluate(&state, 0.0, Some(&still)).unwrap();
     let count = system.stiffness.equations.count();
@@ -143,7 +143,7 @@ fn moves_rigidly(mut model: Assembly) {
     let rest = (0..4).map(|node| model.rest[node]);
     let motion = Motion::rotation([0.3, -0.2, 0.9], [0.0; 3], 2.5, curve, rest);
     model.model_mut().constrain("hand", vec![0, 1, 2, 3], motion);
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     let settings = StaticSettings { tolerance: 1e-12, ..StaticSettings::default() };
     let mut solver = Statics::new(model.clone(), settings).unwrap();
     for step in 1..=10 {
@@ -162,7 +162,7 @@ fn moves_rigidly(mut model: Assembly) {
     // Free in space it keeps its shape and its momentum.
     model.model_mut().constraints.pop();
     let velocity = Vector3::new(0.2, -0.1, 0.3);
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     state.velocity.fill(velocity);
     let mut solver =
         BackwardEuler::new(model.clone(), DynamicSettings { tolerance: 1e-12, ..DynamicSettings::new(0.01) })
@@ -182,7 +182,7 @@ fn nodes_on_a_line_are_bound() {
     let mut model = model();
     model.model_mut().constraints[0].nodes = vec![4, 8, 12];
     model.model_mut().fix("base", vec![0, 1, 2, 3]);
-    let mut state = State::at_rest(&model);
+    let mut state = AssemblyState::at_rest(&model);
     let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
     let step = solver.solve(&mut state, 1.0).unwrap();
     let length = |a: usize, b: usize| (state.position[a] - state.position[b]).norm();

@@ -10,7 +10,7 @@ use pliant_testing::Random;
 
 use crate::model::assembly::Assembly;
 use crate::model::contact::ContactModel;
-use crate::model::state::State;
+use crate::model::state::AssemblyState;
 use crate::system::contact::{ContactNow, ContactSystem};
 use crate::system::samples::Samples;
 use crate::tests::{ball, cube, model, strip};
@@ -41,13 +41,13 @@ fn contact(model: &Assembly, radius: f64, at: Vector3<f64>, level: u8) -> Contac
     }
 }
 
-fn now(model: &Arc<Assembly>, state: &State, contact: &ContactModel) -> ContactNow {
+fn now(model: &Arc<Assembly>, state: &AssemblyState, contact: &ContactModel) -> ContactNow {
     ContactSystem::new(contact, model).at(state)
 }
 
 /// A state that is shaken: six numbers a node, up to a size.
-fn shaken(model: &Assembly, random: &mut Random, size: f64) -> State {
-    let mut state = State::at_rest(model);
+fn shaken(model: &Assembly, random: &mut Random, size: f64) -> AssemblyState {
+    let mut state = AssemblyState::at_rest(model);
     let shake: Vec<f64> = (0..6 * model.rest.len()).map(|_| size * random.number()).collect();
     state.advance(&shake, 1.0);
     state
@@ -138,7 +138,7 @@ fn gaps_come_to_those_of_the_sphere_with_the_level() {
                 .for_each(|own| own.direction = Vector3::from(rest[own.node as usize]).normalize());
         }
         let model = Arc::new(model);
-        let state = State::at_rest(&model);
+        let state = AssemblyState::at_rest(&model);
         let off = [0, 1, 2].map(|level| {
             let mut random = Random::new(5);
             let mut worst = 0.0_f64;

@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use pliant_format::tables::ContactTable;
-use pliant_implicit::{ContactModel, State, meetings};
+use pliant_implicit::{AssemblyState, ContactModel, meetings};
 use pliant_sim::contact::barrier::BarrierSettings;
 use pliant_sim::contact::touch::{Contacts, With};
 
@@ -201,7 +201,7 @@ impl InContact<'_> {
     }
 
     /// A contact with a barrier whose bodies have no gap at the start, and are to be pushed apart.
-    pub(super) fn without_gap(&self, start: &State) -> Option<String> {
+    pub(super) fn without_gap(&self, start: &AssemblyState) -> Option<String> {
         let (contacts, barriers) = (self.contacts.as_ref()?, &self.terms.barriers);
         let is_asked =
             |name: &String| self.scene.contacts.iter().any(|(known, table)| known == name && table.separate);

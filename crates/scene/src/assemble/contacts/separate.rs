@@ -310,7 +310,7 @@ impl InContact<'_> {
     /// forces between them.
     pub(in crate::assemble) fn separate(
         &mut self,
-        start: Option<&pliant_implicit::State>,
+        start: Option<&pliant_implicit::AssemblyState>,
     ) -> Option<Arc<Vec<[f64; 3]>>> {
         let without_gap = start.and_then(|start| self.without_gap(start));
         let (contacts, name) =

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use pliant_format::diagnostic::SceneErrors;
 use pliant_format::tables::SolverName;
 use pliant_geometry::Vector3;
-use pliant_implicit::State;
+use pliant_implicit::AssemblyState;
 use pliant_sim::ImplicitBodies;
 
 use super::Built;
@@ -23,7 +23,7 @@ use super::ties::Tied;
 pub(super) struct Started<'s> {
     checked: Checked<'s>,
     /// The state that a run of an implicit solver starts from; `None` with other solvers.
-    pub start: Option<State>,
+    pub start: Option<AssemblyState>,
     /// Displacements [m] of all nodes at the start, where bodies were pushed apart.
     pushed: Option<Arc<Vec<[f64; 3]>>>,
 }
@@ -99,10 +99,10 @@ impl Checked<'_> {
     }
 
     /// The state that a run of an implicit solver starts from.
-    fn start(&mut self) -> Option<State> {
+    fn start(&mut self) -> Option<AssemblyState> {
         let displacement = self.initial_displacement();
         let assembly = &self.assembly;
-        let mut start = self.scene.is_implicit().then(|| State::at_rest(assembly))?;
+        let mut start = self.scene.is_implicit().then(|| AssemblyState::at_rest(assembly))?;
         if let Some(displacement) = displacement {
             let positions: Vec<Vector3> = assembly.places().zip(displacement).map(|(x, u)| x + u).collect();
             start.set_positions(assembly, &positions);
@@ -120,7 +120,7 @@ impl Checked<'_> {
     }
 
     /// Moves a start to displacements from rest [m].
-    fn place(&self, start: &mut State, displacement: &[[f64; 3]]) {
+    fn place(&self, start: &mut AssemblyState, displacement: &[[f64; 3]]) {
         let moved = self.assembly.places().zip(displacement).map(|(x, u)| x + Vector3::from(*u));
         let positions: Vec<Vector3> = moved.collect();
         start.set_positions(&self.assembly, &positions);

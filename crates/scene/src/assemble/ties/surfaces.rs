@@ -3,7 +3,7 @@
 use pliant_format::diagnostic::Diagnostic;
 use pliant_geometry::Mesh;
 use pliant_geometry::words::number;
-use pliant_implicit::{CurvedSurface, State};
+use pliant_implicit::{AssemblyState, CurvedSurface};
 use pliant_mechanics::mapping::Weights;
 use pliant_mechanics::model::Surface;
 use pliant_shells::{Carried, EdgeRule};
@@ -78,7 +78,7 @@ impl Tied<'_> {
     fn carry_on_shell(&mut self, body: usize, cells: &[u32], name: &str, surface: &Mesh) -> Weights {
         let assembly = &self.meshed.assembly;
         let curved = self.curved.get_or_insert_with(|| CurvedSurface::new(assembly, EdgeRule::Arc));
-        let rest = State::at_rest(assembly);
+        let rest = AssemblyState::at_rest(assembly);
         let points = curved.carry_all(assembly, &rest, cells, &surface.points).unwrap_or_default();
         let away = |point: &Carried| point.height.hypot(point.aside[0]).hypot(point.aside[1]);
         let farthest = points.iter().map(away).fold(0.0, f64::max);

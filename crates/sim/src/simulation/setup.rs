@@ -7,24 +7,24 @@ use pliant_mechanics::fingerprint;
 use super::meshes;
 use crate::coupled_surfaces::CoupledSurface;
 use crate::failure::Failure;
-use crate::part::Part;
+use crate::participant_setup::ParticipantSetup;
 use crate::penalty::PenaltyTie;
 
 /// The participants of a simulation: constant while it runs.
 #[derive(Clone, Debug)]
-pub struct World {
+pub struct Setup {
     /// Bodies that one stepper advances together: at least one participant.
-    pub parts: Vec<Part>,
+    pub parts: Vec<ParticipantSetup>,
     /// Ties between participants.
     pub ties: Vec<PenaltyTie>,
     /// Nodes of participants that others touch.
     pub coupled_surfaces: Vec<CoupledSurface>,
 }
 
-impl World {
-    /// Makes a world of participants that meet at common instants. The number of steps of each becomes a
+impl Setup {
+    /// Makes a setup of participants that meet at common instants. The number of steps of each becomes a
     /// multiple of the number of the participant with the fewest. All have the same duration.
-    pub fn new(mut parts: Vec<Part>) -> Self {
+    pub fn new(mut parts: Vec<ParticipantSetup>) -> Self {
         let common = parts.iter().map(|part| part.steps.number).min().unwrap_or(1);
         for part in &mut parts {
             let duration = part.steps.step * part.steps.number as f64;
@@ -36,7 +36,7 @@ impl World {
     /// A fingerprint of its bodies with their meshes, and of its tools and obstacles, by name; not of laws,
     /// loads or steps.
     pub fn fingerprint_of_bodies(&self) -> u64 {
-        fn of(part: &Part) -> (Vec<(String, u64)>, Vec<&str>) {
+        fn of(part: &ParticipantSetup) -> (Vec<(String, u64)>, Vec<&str>) {
             let things = part.method.contacts().into_iter().flat_map(|all| &all.rigids);
             (meshes(&part.model), things.map(|rigid| rigid.name.as_str()).collect())
         }
@@ -53,12 +53,12 @@ impl World {
     /// True if the steps of a participant are cut where they are too long. The steps of a run can then be
     /// halved.
     pub fn cuts_steps(&self) -> bool {
-        self.parts.iter().any(Part::cuts_steps)
+        self.parts.iter().any(ParticipantSetup::cuts_steps)
     }
 
     /// True if shorter steps may avoid a failure: the failure is of a participant whose steps are cut.
     pub fn shorter_steps_may_avoid(&self, failure: &Failure) -> bool {
-        let of_body = |part: &Part| {
+        let of_body = |part: &ParticipantSetup| {
             part.model.bodies.iter().any(|body| failure.body.as_deref() == Some(body.name.as_str()))
         };
         failure.kind.is_of_long_steps() && self.parts.iter().any(|part| part.cuts_steps() && of_body(part))
@@ -71,14 +71,14 @@ impl World {
     }
 }
 
-impl From<Part> for World {
-    fn from(part: Part) -> Self {
+impl From<ParticipantSetup> for Setup {
+    fn from(part: ParticipantSetup) -> Self {
         Self { parts: vec![part], ties: Vec::new(), coupled_surfaces: Vec::new() }
     }
 }
 
-impl From<Part> for Arc<World> {
-    fn from(part: Part) -> Self {
+impl From<ParticipantSetup> for Arc<Setup> {
+    fn from(part: ParticipantSetup) -> Self {
         Self::new(part.into())
     }
 }

@@ -37,7 +37,7 @@ impl Precision {
 
 /// A participant: bodies that one stepper advances together, and how it does so.
 #[derive(Clone, Debug)]
-pub struct Part {
+pub struct ParticipantSetup {
     /// Its name.
     pub name: String,
     /// Nodes, bodies, names of constraints and carried surfaces; solids, too.
@@ -64,7 +64,7 @@ pub enum Method {
     ExplicitShells(Arc<ImplicitBodies>, ShortSteps),
     /// Equilibria of shells and solids at the ends of load steps, by Newton's method.
     Static(Arc<ImplicitBodies>, StaticSettings),
-    /// Shells and solids with inertia in long steps; the length of [`Part::steps`] counts.
+    /// Shells and solids with inertia in long steps; the length of [`ParticipantSetup::steps`] counts.
     Implicit(Arc<ImplicitBodies>, LongSteps),
 }
 
@@ -174,7 +174,7 @@ const EXPLICIT_CELL: u64 = 150;
 const IMPLICIT_CELL: u64 = 3000;
 const IMPLICIT_SHELL: u64 = 7000;
 
-impl Part {
+impl ParticipantSetup {
     /// Least memory in bytes of its solver, in addition to the model.
     fn bytes(&self) -> u64 {
         let cells = self.model.cell_count() as u64;
