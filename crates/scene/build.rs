@@ -1,6 +1,6 @@
-//! A number for the text of everything that makes meshes of images, as `PLIANT_MESHER`: another text, another
-//! key in the cache of meshes. Where the other crates do not lie beside this one, their version stands for
-//! them.
+//! Sets `PLIANT_MESHER` to a hash of the source text of all crates that make meshes of images. Another text
+//! gives another key in the cache of meshes. If the sources of these crates are not in the neighbouring
+//! folders, the version of this crate stands for them.
 
 use std::collections::hash_map::DefaultHasher;
 use std::fs;
@@ -20,7 +20,7 @@ fn main() {
     println!("cargo:rustc-env=PLIANT_MESHER={version}-{:016x}", hash.finish());
 }
 
-/// All files in a folder and below, in the order of their names.
+/// Returns the files in a folder and below, in the order of their names.
 fn files(folder: &Path) -> Vec<PathBuf> {
     let mut entries: Vec<PathBuf> =
         fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()).collect();

@@ -1,4 +1,4 @@
-//! Tells the crate the commit it is built from, where git knows it.
+//! Gives the crate the commit it is built from, if git knows it.
 
 use std::process::Command;
 

@@ -39,7 +39,7 @@ Examples:
   pliant-lab bench --list
   pliant-lab bench --only tet4-nh-55566 --only tet4-nh-55566-all
   pliant-lab bench --json > bench.json
-  pliant-lab bench --full --table docs/lab/performance.md
+  pliant-lab bench --full --table docs/lab/step-costs.md
 
 Keep the machine otherwise idle; the least and the most of the repeats reveal other load.";
 

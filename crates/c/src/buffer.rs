@@ -49,7 +49,7 @@ impl<const N: usize> Writer<N> {
 }
 
 impl PliantBuffer {
-    /// What writes so many items, each of `N` numbers.
+    /// Makes a writer of `items` items, each of `N` numbers.
     ///
     /// # Safety
     /// `data` is null or has room for `count` items at this stride, as long as items are written.
@@ -59,10 +59,10 @@ impl PliantBuffer {
         Ok(Writer { data: self.data.cast(), stride, items, single: self.numbers == PLIANT_F32 })
     }
 
-    /// Writes numbers, so many an item.
+    /// Writes numbers, `components` for each item.
     ///
     /// # Safety
-    /// As [`writer`](Self::writer).
+    /// The conditions are the same as for [`writer`](Self::writer).
     pub(crate) unsafe fn write_all(&self, values: &[f64], components: usize) -> Result<(), Fault> {
         let items = values.len() / components.max(1);
         let size = self.check(components, items)?;

@@ -1,5 +1,5 @@
-//! The context: a table of what a program has open. A handle is a place in the table and how often the place
-//! was used, so that a closed handle is known as one, however often its place was used again.
+//! The context: a table of the open items of a program. A handle holds a place in the table and how often
+//! that place was used. So a closed handle is recognised, however often its place is used again.
 
 use std::mem::MaybeUninit;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -10,19 +10,19 @@ use pliant_sim::panicked;
 use crate::open::{OpenScene, OpenSnapshot, Shared};
 use crate::status::{Fault, PliantError, PliantStatus, reported};
 
-/// All that a program has open. Opened by `pliant_context_open`.
+/// Table of everything that a program has open. Opened by `pliant_context_open`.
 pub struct PliantContext {
     slots: Mutex<Vec<Slot>>,
 }
 
 /// A place of the table.
 struct Slot {
-    /// How often it was used.
+    /// Number of times that the place was used.
     uses: u32,
     item: Option<Item>,
 }
 
-/// What a handle means.
+/// Target of a handle.
 #[derive(Clone)]
 pub(crate) enum Item {
     Scene(Arc<Mutex<OpenScene>>),
@@ -74,7 +74,7 @@ impl PliantContext {
     pub(crate) fn close(&self, handle: u64) -> Result<(), Fault> {
         let mut slots = self.slots();
         let item = found(&mut slots, handle)?.item.take().ok_or_else(closed)?;
-        // What was open is dropped without the table.
+        // The item is dropped outside of the lock on the table.
         drop(slots);
         if let Item::Simulation(shared) = &item {
             shared.stop();
@@ -122,11 +122,11 @@ fn wrong(wanted: &str, given: &Item) -> Fault {
     Fault::new(PliantStatus::BadHandle, format!("the handle is of a {}, not of a {wanted}", given.kind()))
 }
 
-/// The border: what a call does, with its errors and panics reported to the caller. A panic closes the handle
-/// that it was about.
+/// The border: executes a call, and reports errors and panics to the caller. A panic closes the handle of the
+/// call.
 ///
 /// # Safety
-/// `context` and `error` are null or point to what they say.
+/// `context` and `error` are null or point to values of their types.
 pub(crate) unsafe fn call(
     context: *const PliantContext,
     handle: u64,

@@ -9,7 +9,7 @@ use crate::simulation::{PliantSimulation, running};
 use crate::status::{Fault, PliantError, PliantStatus};
 
 impl Running {
-    /// Holds a combination of nodes where it is, as firmly as asked and stable.
+    /// Holds a combination of nodes at its present place, with the given stiffness or the largest stable one.
     fn take(&mut self, nodes: Vec<(u32, f64)>, stiffness: f64) -> Result<u32, Fault> {
         if stiffness.is_nan() || stiffness <= 0.0 {
             let message = format!("`stiffness` is {stiffness}: it is above 0, or infinite for a pin");
@@ -35,7 +35,8 @@ impl Running {
 
 /// Takes hold of nodes by a spring of a stiffness [N/m]; infinite is a pin. It acts on their mean by
 /// `weights`, which need not sum to 1; null weighs all the same. The stiffness is at most the one with which
-/// steps stay stable; `pliant_grip` tells it. `grip` gets its number. It pulls nothing until it is moved.
+/// steps stay stable; `pliant_grip` reports it. `grip` gets the number of the grip. The grip pulls nothing
+/// until it is moved.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_grip_nodes(
     context: *const PliantContext,
@@ -47,7 +48,7 @@ pub unsafe extern "C" fn pliant_grip_nodes(
     grip: *mut u32,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             needed(grip, "grip")?;
@@ -78,9 +79,9 @@ pub unsafe extern "C" fn pliant_grip_nodes(
     }
 }
 
-/// Takes hold of a surface around its vertex that is nearest to a point [m], as a hand does: of what lies
-/// within a radius [m] of it at rest and hangs together with it, less with the distance; else as
-/// `pliant_grip_nodes`. With a radius of 0 it holds the vertex alone.
+/// Takes hold of a surface around its vertex that is nearest to a point [m], as a hand does. The grip holds
+/// the connected surface within a radius [m] of that vertex at rest, less with the distance. With a radius of
+/// 0 it holds the vertex alone. Stiffness and number are as in `pliant_grip_nodes`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_grip_surface(
     context: *const PliantContext,
@@ -92,7 +93,7 @@ pub unsafe extern "C" fn pliant_grip_surface(
     grip: *mut u32,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             needed(grip, "grip")?;
@@ -117,7 +118,7 @@ pub unsafe extern "C" fn pliant_grip_surface(
     }
 }
 
-/// Moves a grip to a place [m]: what it holds is pulled there from the next step on.
+/// Moves a grip to a place [m]: it pulls its nodes there from the next step on.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_grip_move(
     context: *const PliantContext,
@@ -126,7 +127,7 @@ pub unsafe extern "C" fn pliant_grip_move(
     place: *const f64,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             let place = numbers(place, "place")?;
@@ -140,9 +141,9 @@ pub unsafe extern "C" fn pliant_grip_move(
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct PliantGrip {
-    /// The mean of what it holds [m].
+    /// Mean place of its nodes [m].
     pub point: [f64; 3],
-    /// Where it pulls to [m].
+    /// Place to which the grip pulls [m].
     pub place: [f64; 3],
     /// Its force on the body [N].
     pub force: [f64; 3],
@@ -150,7 +151,7 @@ pub struct PliantGrip {
     pub stiffness: f64,
 }
 
-/// Tells how a grip pulls.
+/// Reports the pull of a grip.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_grip(
     context: *const PliantContext,
@@ -159,7 +160,7 @@ pub unsafe extern "C" fn pliant_grip(
     now: *mut PliantGrip,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             own.see_places()?;
@@ -178,7 +179,7 @@ pub unsafe extern "C" fn pliant_grip_release(
     grip: u32,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             own.held.get(grip)?;

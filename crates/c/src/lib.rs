@@ -2,23 +2,24 @@
 //! normals, fields and forces, and lead tools and hands. `include/pliant.h` is made of these declarations,
 //! `include/pliant.hpp` wraps it for C++; the guide is `docs/guide/c.md`.
 //!
-//! It is thin: a [`World`](pliant_scene::World) is built, a [`Simulation`](pliant_sim::Simulation) stepped,
-//! and what is read comes from [`Skin`](pliant_run::Skin) and [`FieldReader`](pliant_run::FieldReader).
+//! The interface is thin: it builds a [`World`](pliant_scene::World) and steps a
+//! [`Simulation`](pliant_sim::Simulation). Positions and values come from [`Skin`](pliant_run::Skin) and
+//! [`FieldReader`](pliant_run::FieldReader).
 //!
-//! **What a caller owes** to every function, and what the `unsafe` here rests on:
-//! * A pointer is null, or points to what its type says, as long as the call lasts: texts end with a zero,
-//!   arrays have the items, and buffers the room, that the call says. Null is answered by
+//! **Duties of the caller** for every function, on which the `unsafe` here rests:
+//! * A pointer is null, or points to a value of its type as long as the call lasts. Texts end with a zero.
+//!   Arrays have as many items, and buffers as much room, as the call says. Null is answered by
 //!   `PLIANT_STATUS_NULL`, unless the function gives it a meaning.
-//! * A context is one that `pliant_context_open` gave, and is closed only while no call on it is under way.
-//!   After that it must not be used.
+//! * A context comes from `pliant_context_open`, and is closed only while no call on it is under way. A
+//!   closed context must not be used.
 //!
-//! All else is checked: handles are numbers in the table of their context, so one that is closed, of another
-//! kind, of another context or made up is answered by an error. No panic leaves the library: it is answered
-//! by `PLIANT_STATUS_INTERNAL`, and closes the handle. Errors go into a [`PliantError`] of the caller; there
-//! is no global state.
+//! The library checks everything else. Handles are numbers in the table of their context. So a handle that is
+//! closed, of another kind, of another context or made up is answered by an error. No panic leaves the
+//! library: the call returns `PLIANT_STATUS_INTERNAL`, and the handle is closed. Errors go into a
+//! [`PliantError`] of the caller; there is no global state.
 //!
-//! **Threads**: calls on different handles run side by side; on one handle one call at a time, and a second
-//! one is answered by `PLIANT_STATUS_BUSY` at once. `pliant_stop` and `..._close` may be called at any time.
+//! **Threads**: calls on different handles run side by side. A handle takes one call at a time; a second call
+//! is answered by `PLIANT_STATUS_BUSY` at once. `pliant_stop` and `..._close` may be called at any time.
 
 mod buffer;
 mod context;

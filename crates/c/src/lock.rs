@@ -4,7 +4,7 @@ use std::sync::{Mutex, MutexGuard, TryLockError};
 
 use crate::status::{Fault, PliantStatus};
 
-/// Holds what only one thread may use at a time; a second one gets an answer at once.
+/// A value that only one thread may use at a time; a second thread gets an answer at once.
 pub(crate) fn lock<T>(mutex: &Mutex<T>) -> Result<MutexGuard<'_, T>, Fault> {
     mutex.try_lock().map_err(|error| match error {
         TryLockError::WouldBlock => {

@@ -34,7 +34,7 @@ pub(crate) unsafe fn some_text<'a>(text: *const c_char, what: &str) -> Result<Op
 /// An array of the caller.
 ///
 /// # Safety
-/// It is null or has so many items, and lives as long as the array is used.
+/// `items` is null or has `count` items, and lives as long as the array is used.
 pub(crate) unsafe fn array<'a, T>(items: *const T, count: usize, what: &str) -> Result<&'a [T], Fault> {
     if count == 0 {
         return Ok(&[]);
@@ -91,11 +91,11 @@ pub(crate) fn needed<T>(to: *const T, what: &str) -> Result<(), Fault> {
     if to.is_null() { Err(null(what)) } else { Ok(()) }
 }
 
-/// Gives the caller a text with a zero at its end, and its length without it; a short or null buffer gets the
-/// length alone.
+/// Gives the caller a text with a zero at its end, and the length without the zero. A null buffer without
+/// capacity gets the length alone; a short buffer is an error, and gets the length, too.
 ///
 /// # Safety
-/// `to` is null or has so many bytes; `length` is null or may be written.
+/// `to` is null or has room for `capacity` bytes; `length` is null or may be written.
 pub(crate) unsafe fn give_bytes(
     bytes: &[u8],
     to: *mut u8,
@@ -118,8 +118,8 @@ pub(crate) unsafe fn give_bytes(
             format!("the buffer has {capacity} bytes, {room} are needed"),
         ));
     }
-    // SAFETY: there is room for all bytes and the zero, and buffers of the caller are not those of the
-    // library.
+    // SAFETY: there is room for all bytes and the zero, and buffers of the caller and of the library do not
+    // overlap.
     unsafe {
         to.copy_from_nonoverlapping(bytes.as_ptr(), bytes.len());
         if zero {

@@ -1,5 +1,5 @@
-//! Scenes: from a file or a text, with other values and meshes of the program, until simulations are made of
-//! them.
+//! Scenes: from a file or a text, with other values and meshes of the program. Simulations are made from
+//! scenes.
 
 use std::ffi::c_char;
 use std::path::Path;
@@ -32,11 +32,11 @@ pub const PLIANT_HEXES: u32 = 12;
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct PliantCells {
-    /// `PLIANT_TETS` or another kind; the numbers are those of VTK.
+    /// `PLIANT_TETS` or another kind, with the numbers of VTK.
     pub kind: u32,
-    /// How many cells.
+    /// Number of cells.
     pub count: usize,
-    /// Nodes of a cell after those of the one before, from 0.
+    /// Nodes of all cells, cell after cell, counted from 0.
     pub nodes: *const u32,
     /// A label for each cell, or null.
     pub labels: *const i32,
@@ -51,7 +51,7 @@ pub unsafe extern "C" fn pliant_scene_load(
     scene: *mut PliantScene,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         call(context, 0, error, |context| {
             needed(scene, "scene")?;
@@ -63,8 +63,8 @@ pub unsafe extern "C" fn pliant_scene_load(
     }
 }
 
-/// Opens a scene from its text, of so many bytes. Files that it names are relative to `folder`; null is the
-/// folder of the process. `name` is what errors call it; null is `scene.toml`.
+/// Opens a scene from its text of `length` bytes. Files that it names are relative to `folder`; null is the
+/// folder of the process. `name` is the name of the text in errors; null is `scene.toml`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_scene_parse(
     context: *const PliantContext,
@@ -75,7 +75,7 @@ pub unsafe extern "C" fn pliant_scene_parse(
     scene: *mut PliantScene,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         call(context, 0, error, |context| {
             needed(scene, "scene")?;
@@ -108,7 +108,7 @@ pub unsafe extern "C" fn pliant_scene_set(
     assignment: *const c_char,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         call(context, scene, error, |context| {
             let scene = context.scene(scene)?;
@@ -135,7 +135,7 @@ pub unsafe extern "C" fn pliant_scene_give_mesh(
     kinds: usize,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         call(context, scene, error, |context| {
             let scene = context.scene(scene)?;
@@ -159,10 +159,10 @@ pub unsafe extern "C" fn pliant_scene_give_mesh(
     }
 }
 
-/// Cells of the program as those of a mesh.
+/// Makes cells of a mesh from cells of the program.
 ///
 /// # Safety
-/// Pointers of `cells` are what the caller owes.
+/// Pointers of `cells` are valid, as the caller promises.
 unsafe fn block(cells: &PliantCells, points: usize) -> Result<CellBlock, Fault> {
     let kind = match cells.kind {
         PLIANT_LINES => CellKind::Line,
@@ -202,7 +202,7 @@ pub unsafe extern "C" fn pliant_scene_close(
     scene: PliantScene,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         call(context, scene, error, |context| {
             context.scene(scene)?;

@@ -37,9 +37,9 @@ pub(crate) unsafe fn running(
     }
 }
 
-/// Makes a simulation of a scene as it is now, at its start. It computes on so many threads of its own, 1024
-/// at most; 0 takes `threads` of the scene's `[run]`. Results do not depend on their number. Images are
-/// meshed and shapes built here: this can take seconds.
+/// Makes a simulation of a scene as it is now, at its start. It computes on threads of its own, 1024 at most;
+/// with 0 it takes `threads` of the scene's `[run]`. Results do not depend on their number. Images are meshed
+/// and shapes built here: this can take seconds.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_simulation_open(
     context: *const PliantContext,
@@ -48,7 +48,7 @@ pub unsafe extern "C" fn pliant_simulation_open(
     simulation: *mut PliantSimulation,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         call(context, scene, error, |context| {
             needed(simulation, "simulation")?;
@@ -87,7 +87,7 @@ pub unsafe extern "C" fn pliant_simulation_close(
     simulation: PliantSimulation,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         call(context, simulation, error, |context| {
             context.simulation(simulation)?;
@@ -96,7 +96,7 @@ pub unsafe extern "C" fn pliant_simulation_close(
     }
 }
 
-/// Where a simulation is, and its sizes.
+/// Time, step and sizes of a simulation.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct PliantNow {
@@ -110,7 +110,7 @@ pub struct PliantNow {
     pub nodes: u64,
 }
 
-/// Tells where a simulation is.
+/// Reports time, step and sizes of a simulation.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_now(
     context: *const PliantContext,
@@ -118,7 +118,7 @@ pub unsafe extern "C" fn pliant_now(
     now: *mut PliantNow,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             let Running { simulation, .. } = &*own;
@@ -128,8 +128,8 @@ pub unsafe extern "C" fn pliant_now(
     }
 }
 
-/// Goes so many steps on. `done`, if it is not null, gets how many were taken, also where one fails or
-/// another thread asks to stop. After a failure the simulation stands at the last good instant; restore a
+/// Takes `count` steps. `done`, if it is not null, gets the number of steps taken, also after a failure or a
+/// stop from another thread. After a failure the simulation stands at the last good instant; restore a
 /// snapshot, or close it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_step(
@@ -139,12 +139,11 @@ pub unsafe extern "C" fn pliant_step(
     done: *mut u64,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe { go(context, simulation, done, error, |_, taken| Ok(count - taken)) }
 }
 
-/// Goes on until a time [s], to the instant nearest to it; else as `pliant_step`. A time that has passed
-/// takes no step.
+/// Steps to the instant nearest to a time [s], like `pliant_step`. A time that has passed takes no step.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_run_until(
     context: *const PliantContext,
@@ -153,7 +152,7 @@ pub unsafe extern "C" fn pliant_run_until(
     done: *mut u64,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         go(context, simulation, done, error, |now, _| {
             finite(&[time], "time")?;
@@ -218,15 +217,16 @@ unsafe fn go(
     status
 }
 
-/// Asks the thread that steps a simulation to stop after its step. A step that takes long is given up: it is
-/// not taken. Without such a thread, the next call that steps returns at once. Any thread may ask.
+/// Asks the thread that steps a simulation to stop after its step. A step that takes long is abandoned, and
+/// the simulation stays at the instant before. Without such a thread, the next call that steps returns at
+/// once. Any thread may ask.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_stop(
     context: *const PliantContext,
     simulation: PliantSimulation,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         call(context, simulation, error, |context| {
             context.simulation(simulation)?.stop();
@@ -245,7 +245,7 @@ pub unsafe extern "C" fn pliant_push(
     count: usize,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             let numbers = array(forces, count.saturating_mul(3), "forces")?;
@@ -262,7 +262,7 @@ pub unsafe extern "C" fn pliant_push(
     }
 }
 
-/// What a name is looked for among.
+/// Bodies, as the kind of a name.
 pub const PLIANT_BODIES: u32 = 0;
 /// Surfaces that bodies carry.
 pub const PLIANT_SURFACES: u32 = 1;
@@ -289,7 +289,7 @@ pub unsafe extern "C" fn pliant_name(
     length: *mut usize,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             let names = names(own, kind)?;

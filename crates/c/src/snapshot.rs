@@ -30,7 +30,7 @@ pub unsafe extern "C" fn pliant_snapshot_take(
     snapshot: *mut PliantSnapshot,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             needed(snapshot, "snapshot")?;
@@ -50,7 +50,7 @@ pub unsafe extern "C" fn pliant_snapshot_restore(
     snapshot: PliantSnapshot,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             let snapshot = known(context)?.snapshot(snapshot)?;
@@ -77,7 +77,7 @@ pub unsafe extern "C" fn pliant_snapshot_bytes(
     length: *mut usize,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         call(context, snapshot, error, |context| {
             let snapshot = context.snapshot(snapshot)?;
@@ -87,8 +87,8 @@ pub unsafe extern "C" fn pliant_snapshot_bytes(
     }
 }
 
-/// Reads a snapshot of a simulation of the same scene from bytes. `PLIANT_STATUS_BAD_SNAPSHOT` tells of
-/// others, and of damage.
+/// Reads a snapshot of a simulation of the same scene from bytes. Other and damaged snapshots give
+/// `PLIANT_STATUS_BAD_SNAPSHOT`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_snapshot_read(
     context: *const PliantContext,
@@ -98,7 +98,7 @@ pub unsafe extern "C" fn pliant_snapshot_read(
     snapshot: *mut PliantSnapshot,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             needed(snapshot, "snapshot")?;
@@ -118,7 +118,7 @@ pub unsafe extern "C" fn pliant_snapshot_close(
     snapshot: PliantSnapshot,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         call(context, snapshot, error, |context| {
             context.snapshot(snapshot)?;

@@ -8,11 +8,11 @@ use pliant_format::diagnostic::SceneErrors;
 use pliant_format::source::Source;
 use pliant_sim::Failure;
 
-/// What a call returns.
+/// Result of a call.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PliantStatus {
-    /// It did what was asked.
+    /// The call succeeded.
     Ok = 0,
     /// A pointer is null that must not be.
     Null = 1,
@@ -30,19 +30,19 @@ pub enum PliantStatus {
     Busy = 7,
     /// There is nothing of this name.
     Unknown = 8,
-    /// The scene has mistakes; line, column and key tell the first one.
+    /// The scene has mistakes; line, column and key locate the first one.
     Scene = 9,
     /// A file can't be read.
     File = 10,
-    /// The simulation failed: kind, body, node, element and time tell where.
+    /// The simulation failed; kind, body, node, element and time locate the failure.
     Failed = 11,
     /// The solver or the device can't do this.
     Unsupported = 12,
-    /// Another thread asked to stop; what was done so far stays.
+    /// Another thread asked to stop; the steps taken so far stay.
     Stopped = 13,
     /// The program was built for another version of this interface.
     Version = 14,
-    /// Cells of a mesh have nodes that there are not, or a kind that is none.
+    /// A cell names a node that does not exist, or has an unknown type.
     BadCells = 15,
     /// A snapshot is damaged, or of another model.
     BadSnapshot = 16,
@@ -50,8 +50,8 @@ pub enum PliantStatus {
     Internal = 17,
 }
 
-/// What went wrong, and where. The caller owns it; it holds no memory of the library. Texts are UTF-8, end
-/// with a zero and are cut where they are longer.
+/// An error and its place. The caller owns it; it holds no memory of the library. Texts are UTF-8, end with a
+/// zero and are cut where they are longer.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct PliantError {
@@ -69,7 +69,7 @@ pub struct PliantError {
     pub element: i64,
     /// Time [s] of the simulation; NaN if it is about none.
     pub time: f64,
-    /// Of `PLIANT_STATUS_FAILED`: `not-finite`, `inverted`, `unbalanced`, `unstable`, `singular`,
+    /// Kind of a `PLIANT_STATUS_FAILED`: `not-finite`, `inverted`, `unbalanced`, `unstable`, `singular`,
     /// `not-converged`, `blocked`, `intersecting`, `hourglass`, `device`, `output` or `input`.
     pub kind: [c_char; 32],
     /// The body that it is about.
@@ -78,7 +78,7 @@ pub struct PliantError {
     pub key: [c_char; 256],
     /// The scene file, as it was given.
     pub file: [c_char; 512],
-    /// What is wrong and what to try.
+    /// The mistake, and a remedy.
     pub message: [c_char; 2048],
 }
 
@@ -90,7 +90,7 @@ pub(crate) struct Fault {
     place: Option<Box<Place>>,
 }
 
-/// Where it is.
+/// Place of an error.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Place {
     mistakes: u32,
@@ -109,7 +109,7 @@ impl Fault {
         Self { status, message: message.into(), place: None }
     }
 
-    /// Mistakes of a scene; its source, where it was read, tells the key.
+    /// Makes a fault of mistakes of a scene; the key comes from its source, if that was read.
     pub(crate) fn scene(errors: &SceneErrors, source: Option<&Source>) -> Self {
         let mistakes = || errors.diagnostics().iter().filter(|one| one.is_error());
         let Some(first) = mistakes().next() else {

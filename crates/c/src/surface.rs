@@ -39,7 +39,7 @@ impl Running {
     }
 }
 
-/// What a surface has.
+/// Sizes of a surface.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct PliantSurface {
@@ -61,7 +61,7 @@ pub unsafe extern "C" fn pliant_surface_open(
     surface: *mut PliantSurface,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             needed(surface, "surface")?;
@@ -90,8 +90,8 @@ pub unsafe extern "C" fn pliant_surface_open(
     }
 }
 
-/// Copies the three vertices of each triangle, counter-clockwise seen from outside. There is room for so many
-/// triangles.
+/// Copies the three vertices of each triangle, counter-clockwise seen from outside. `capacity` is the number
+/// of triangles that there is room for.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_surface_triangles(
     context: *const PliantContext,
@@ -101,7 +101,7 @@ pub unsafe extern "C" fn pliant_surface_triangles(
     capacity: usize,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             let all = own.surface(surface)?.skin.triangles();
@@ -126,7 +126,7 @@ pub unsafe extern "C" fn pliant_surface_positions(
     buffer: PliantBuffer,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             own.see_places()?;
@@ -141,7 +141,7 @@ pub unsafe extern "C" fn pliant_surface_positions(
     }
 }
 
-/// Copies the unit normals of the vertices: the mean of those of the triangles around each, by area.
+/// Copies the unit normals of the vertices: the mean of the normals of the triangles around each, by area.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_surface_normals(
     context: *const PliantContext,
@@ -150,7 +150,7 @@ pub unsafe extern "C" fn pliant_surface_normals(
     buffer: PliantBuffer,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             let found = own.bring(surface, true, |open| (&open.skin, &mut open.own))?;
@@ -161,8 +161,8 @@ pub unsafe extern "C" fn pliant_surface_normals(
     }
 }
 
-/// Lends positions [m] and unit normals, three `double` a vertex. What is pointed to stays as it is until the
-/// next call of this function for this surface, and is there until the simulation is closed; the pointers
+/// Lends positions [m] and unit normals, three `double` a vertex. The values stay the same until the next
+/// call of this function for this surface. The memory stays until the simulation is closed, and the pointers
 /// stay the same. `normals` may be null, which saves their cost.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_surface_lend(
@@ -173,7 +173,7 @@ pub unsafe extern "C" fn pliant_surface_lend(
     normals: *mut *const f64,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             needed(positions, "positions")?;

@@ -1,4 +1,4 @@
-//! Tools: where a program leads them, and what they feel.
+//! Tools: poses to which a program leads them, and the forces on them.
 
 use std::ffi::c_char;
 
@@ -16,9 +16,9 @@ use crate::values::unknown;
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct PliantTool {
-    /// Where its frame is [m].
+    /// Origin of its frame [m].
     pub position: [f64; 3],
-    /// How it is turned: a unit quaternion x, y, z, w.
+    /// Rotation of its frame: a unit quaternion x, y, z, w.
     pub rotation: [f64; 4],
     /// The angle [rad] between its jaws; 0 without any.
     pub opening: f64,
@@ -28,13 +28,13 @@ pub struct PliantTool {
     pub torque: [f64; 3],
 }
 
-/// A tool that is there, or the fault.
+/// Checks that a tool exists.
 fn known(own: &Running, name: &str) -> Result<(), Fault> {
     own.simulation.tool(name).map(|_| ()).ok_or_else(|| unknown(own, PLIANT_TOOLS, "tool", name))
 }
 
-/// Leads a tool to a pose, its jaws to an angle [rad], or both within a time [s]; `arrival`, if it is not
-/// null, gets the time [s] at which they are there.
+/// Leads a tool to a pose, its jaws to an angle [rad], or both within a time [s]. `arrival`, if it is not
+/// null, gets the time [s] of arrival.
 unsafe fn lead(
     own: &mut Running,
     name: &str,
@@ -45,22 +45,22 @@ unsafe fn lead(
     known(own, name)?;
     let there = own.simulation.lead(name, goal.0, goal.1, within);
     let there = there.map_err(|failure| Fault::new(PliantStatus::NotANumber, failure.message))?;
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     if arrival.is_null() { Ok(()) } else { unsafe { give(arrival, "arrival", there) } }
 }
 
 /// A pose of a place [m] and a quaternion x, y, z, w.
 unsafe fn goal(position: *const f64, rotation: *const f64) -> Result<Pose, Fault> {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     let (place, turn) = unsafe { (numbers(position, "position")?, numbers(rotation, "rotation")?) };
     let refused = || Fault::new(PliantStatus::NotANumber, "`rotation` is a quaternion of length 0");
     pose_of(place, turn).ok_or_else(refused)
 }
 
 /// Leads a tool to a pose within a time [s] from now, on a straight way and the shortest turn; there it
-/// stays. Its jaws go on as they were going. `rotation` is a quaternion x, y, z, w of any length but 0.
-/// `arrival`, if it is not null, gets the time [s] at which it is there: later than asked for where nodes
-/// would be passed over on the way.
+/// stays. The motion of its jaws continues. `rotation` is a quaternion x, y, z, w of any length but 0.
+/// `arrival`, if it is not null, gets the time [s] of arrival. That time is later than asked for if the tool
+/// would pass over nodes on the way.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_tool_lead(
     context: *const PliantContext,
@@ -72,7 +72,7 @@ pub unsafe extern "C" fn pliant_tool_lead(
     arrival: *mut f64,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             let name = text(tool, "tool")?;
@@ -83,8 +83,8 @@ pub unsafe extern "C" fn pliant_tool_lead(
     }
 }
 
-/// Opens or closes the jaws of a tool to an angle [rad] within a time [s] from now, while it goes on as it
-/// was going; else as `pliant_tool_lead`.
+/// Opens or closes the jaws of a tool to an angle [rad] within a time [s] from now. The motion of the tool
+/// continues. `arrival` is as in `pliant_tool_lead`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_tool_open(
     context: *const PliantContext,
@@ -95,7 +95,7 @@ pub unsafe extern "C" fn pliant_tool_open(
     arrival: *mut f64,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             let name = text(tool, "tool")?;
@@ -105,8 +105,8 @@ pub unsafe extern "C" fn pliant_tool_open(
     }
 }
 
-/// Leads a tool to a pose and its jaws to an angle [rad], which are there together; else as
-/// `pliant_tool_lead`.
+/// Leads a tool to a pose and its jaws to an angle [rad], so that both arrive together. The other arguments
+/// are as in `pliant_tool_lead`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_tool_lead_open(
     context: *const PliantContext,
@@ -119,7 +119,7 @@ pub unsafe extern "C" fn pliant_tool_lead_open(
     arrival: *mut f64,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             let name = text(tool, "tool")?;
@@ -130,7 +130,7 @@ pub unsafe extern "C" fn pliant_tool_lead_open(
     }
 }
 
-/// Tells where a tool, an obstacle or a jaw (`grasper.upper`, `grasper.lower`) is, and what it feels.
+/// Reports the pose of a tool, an obstacle or a jaw (`grasper.upper`, `grasper.lower`), and the forces on it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_tool(
     context: *const PliantContext,
@@ -139,7 +139,7 @@ pub unsafe extern "C" fn pliant_tool(
     now: *mut PliantTool,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             needed(now, "now")?;

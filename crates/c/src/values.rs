@@ -15,17 +15,17 @@ use crate::simulation::{
 };
 use crate::status::{Fault, PliantError, PliantStatus};
 
-/// The nodes of a body: so many from the first one on, counted over all bodies.
+/// The nodes of a body: `count` nodes from the first one on, counted over all bodies.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct PliantNodes {
     /// The first one.
     pub first: u64,
-    /// How many.
+    /// Number of nodes.
     pub count: u64,
 }
 
-/// There is nothing of a name; those that there are.
+/// Fault of an unknown name, with the known names.
 pub(crate) fn unknown(own: &Running, kind: u32, what: &str, name: &str) -> Fault {
     let known = names(own, kind).unwrap_or_default();
     let those =
@@ -48,8 +48,8 @@ fn nodes(own: &Running, body: Option<&str>) -> Result<PliantNodes, Fault> {
     }
 }
 
-/// Tells the nodes of a body by name; null is all bodies. They are numbered as in its mesh file, or in the
-/// mesh that was given, unless repairs changed these; a wall on a solid has only nodes of its own here.
+/// Reports the nodes of a body by name; null is all bodies. They are numbered as in its mesh file or in the
+/// given mesh, unless repairs changed the numbers. A wall on a solid has only nodes of its own here.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_body(
     context: *const PliantContext,
@@ -58,19 +58,19 @@ pub unsafe extern "C" fn pliant_body(
     found: *mut PliantNodes,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| give(found, "found", nodes(own, some_text(body, "body")?)?))
     }
 }
 
-/// Where nodes are [m].
+/// Positions of nodes [m].
 pub const PLIANT_POSITION: u32 = 0;
 /// Displacements of nodes [m].
 pub const PLIANT_DISPLACEMENT: u32 = 1;
 /// Velocities of nodes [m/s].
 pub const PLIANT_VELOCITY: u32 = 2;
-/// Where nodes are at rest [m].
+/// Positions of nodes at rest [m].
 pub const PLIANT_REST: u32 = 3;
 
 /// Copies positions, displacements, velocities (`PLIANT_POSITION`, …) of the nodes of a body by name; null is
@@ -84,7 +84,7 @@ pub unsafe extern "C" fn pliant_nodes(
     buffer: PliantBuffer,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             let PliantNodes { first, count } = nodes(own, some_text(body, "body")?)?;
@@ -124,7 +124,8 @@ pub unsafe extern "C" fn pliant_nodes(
     }
 }
 
-/// Fields are read at the points of a body's mesh: those of elements as means of those around.
+/// Fields are read at the points of a body's mesh: fields of elements are means of the elements around each
+/// point.
 pub const PLIANT_AT_POINTS: u32 = 0;
 /// Fields are read in the elements, as computed.
 pub const PLIANT_AT_CELLS: u32 = 1;
@@ -145,7 +146,7 @@ pub unsafe extern "C" fn pliant_field(
     components: *mut usize,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             let (on, name) = (some_text(on, "on")?, text(name, "name")?);
@@ -207,7 +208,7 @@ pub unsafe extern "C" fn pliant_reaction(
     force: *mut [f64; 3],
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             needed(force, "force")?;
@@ -228,7 +229,7 @@ pub unsafe extern "C" fn pliant_contact_force(
     force: *mut [f64; 3],
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             needed(force, "force")?;
@@ -244,19 +245,19 @@ pub unsafe extern "C" fn pliant_contact_force(
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct PliantEnergies {
-    /// Of motion.
+    /// Energy of motion.
     pub kinetic: f64,
     /// Stored in elements, and taken by laws that relax.
     pub internal: f64,
     /// Taken by damping.
     pub damping: f64,
-    /// Of stiffness against hourglass modes, beside `internal`.
+    /// Energy of the stiffness against hourglass modes, in addition to `internal`.
     pub hourglass: f64,
     /// Work from outside.
     pub external: f64,
-    /// What explicit steps of changing length added.
+    /// Energy added by explicit steps of changing length.
     pub step_changes: f64,
-    /// What is missing of their balance over the largest of them so far: above 0.05 a run is questionable.
+    /// Error of the energy balance over the largest energy so far: above 0.05 a run is questionable.
     pub balance: f64,
 }
 
@@ -268,7 +269,7 @@ pub unsafe extern "C" fn pliant_energies(
     energies: *mut PliantEnergies,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             own.look()?;
@@ -289,7 +290,7 @@ pub unsafe extern "C" fn pliant_fingerprint(
     fingerprint: *mut u64,
     error: *mut PliantError,
 ) -> PliantStatus {
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     unsafe {
         running(context, simulation, error, |own| {
             own.see_places()?;

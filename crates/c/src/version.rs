@@ -43,7 +43,7 @@ pub unsafe extern "C" fn pliant_context_open(
         // SAFETY: it is not null, and the caller owes the rest.
         unsafe { give(context, "context", Box::into_raw(Box::new(PliantContext::new()))) }
     };
-    // SAFETY: pointers are what the caller owes.
+    // SAFETY: the caller promises valid pointers.
     reported(open(), unsafe { error.cast::<MaybeUninit<PliantError>>().as_mut() })
 }
 

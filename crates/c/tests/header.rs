@@ -1,5 +1,5 @@
-//! `include/pliant.h` says what the crate says: it is made here from the declarations, which are written
-//! plainly for that. `PLIANT_BLESS=1 cargo test --release -p pliant-c --test header` writes it anew.
+//! `include/pliant.h` matches the crate: this test makes it from the declarations, which have a plain form
+//! for that. `PLIANT_BLESS=1 cargo test --release -p pliant-c --test header` writes it.
 
 use std::fmt::Write;
 use std::fs;
@@ -16,7 +16,7 @@ const HEAD: &str = "/* Pliant: real-time simulation of soft organs, for C and C+
                     /* All that a program has open. */\ntypedef struct PliantContext PliantContext;\n";
 const END: &str = "\n#ifdef __cplusplus\n}\n#endif\n\n#endif\n";
 
-/// A type of Rust in C, with what it is the type of.
+/// Declaration of a name with a type of Rust in C.
 fn declared(of: &str, name: &str) -> String {
     for (pointer, constant) in [("*const ", "const "), ("*mut ", "")] {
         if let Some(target) = of.strip_prefix(pointer) {

@@ -1,4 +1,4 @@
-//! What the border costs: a step through C beside the same step in Rust, and vertices copied out.
+//! Cost of the border: a step through C next to the same step in Rust, and vertices copied out.
 //! `cargo test --release -p pliant-c --test times -- --ignored --nocapture`
 
 use std::ffi::CString;
@@ -10,7 +10,7 @@ use pliant_format::Scene;
 use pliant_format::source::Source;
 use pliant_scene::World;
 
-/// A block of so many cells, whose steps take next to no time where they are few.
+/// A block of the given cells; a few cells make steps that take next to no time.
 fn block(cells: &str) -> String {
     format!(
         r#"[scene]
@@ -45,7 +45,7 @@ struct Opened {
 fn open(text: &str) -> Opened {
     let (mut context, mut scene, mut simulation) = (ptr::null_mut(), 0, 0);
     let none = ptr::null_mut();
-    // SAFETY: all pointers are to live values of their types, and the text has so many bytes.
+    // SAFETY: all pointers are to live values of their types, and the length of the text is right.
     unsafe {
         assert_eq!(pliant_context_open(PLIANT_ABI, &raw mut context, none), PliantStatus::Ok);
         let parsed = pliant_scene_parse(
@@ -117,7 +117,7 @@ fn the_border_costs_less_than_a_microsecond_a_step() {
     }
     let [many, same] = [ours_of_many, theirs_of_many].map(median);
     println!("one of a thousand in a call: {many:.3} µs through C, {same:.3} µs in Rust");
-    // What is left without a step: the handle, the lock and the error.
+    // Cost of a call without a step: the handle, the lock and the error.
     let now = &mut PliantNow { time: 0.0, step: 0.0, steps: 0, nodes: 0 };
     let looks = (0..20_000).map(|_| {
         // SAFETY: the context is open.

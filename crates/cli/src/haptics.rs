@@ -1,7 +1,7 @@
-//! `pliant haptics`: a tool of a scene in the hand of a haptic device, or of a trace of one. The scene steps
-//! in real time; after each period its contact becomes a local model: the tangent planes of the tool at the
-//! nearest points of the surfaces that it can touch, the mean force of the period at its mean place, and the
-//! compliance that the last periods tell.
+//! `pliant haptics`: a tool of a scene in the hand of a haptic device, or driven by a recorded trace. The
+//! scene steps in real time. After each period its contact becomes a local model. The model holds the tangent
+//! planes of the tool at the nearest points of the surfaces that it can touch. It also holds the mean force
+//! of the period at its mean place, and the compliance estimated from the last periods.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -88,7 +88,7 @@ fn settings(arguments: &Haptics) -> Settings {
     Settings { coupling, guard, force_limit, most_change, ..Settings::default() }
 }
 
-/// The tool in the hand: that of a name, or the only one.
+/// Returns the tool in the hand: the named tool, or the only one.
 fn tool(scene: &Scene, asked: Option<&str>) -> Result<String, Failure> {
     let names: Vec<&str> = scene.tools.iter().map(|(name, _)| name.as_str()).collect();
     let listed = || names.join(", ");
@@ -147,7 +147,7 @@ fn failed(failure: pliant_sim::Failure) -> Failure {
     Failure::plain(failure.message, "")
 }
 
-/// Starts the haptic thread: with a trace, after the tool has come to where this begins, or with a device.
+/// Starts the haptic thread with a device, or with a trace after the tool has reached the trace's first pose.
 fn start(
     arguments: &Haptics,
     settings: Settings,
@@ -223,7 +223,7 @@ impl Session<'_> {
         Ok(())
     }
 
-    /// Ends the thread and tells how it went.
+    /// Ends the thread and prints a report.
     fn finish(self, settings: Settings) -> Result<(), Failure> {
         let Self { mut simulation, around, mut thread, pace, estimate, snapshots, pressed } = self;
         let device: [f64; 3] = thread.state().force.into();
@@ -298,7 +298,7 @@ struct Snapshots {
     start: State,
     /// Times [s] and states, the newest last.
     states: VecDeque<(f64, State)>,
-    /// Failures so far, and those in a row that went back to the start.
+    /// Failures so far, and successive failures that went back to the start.
     failures: usize,
     in_a_row: usize,
 }
@@ -442,7 +442,7 @@ impl Pace {
         if left > 0.0 {
             std::thread::sleep(Duration::from_secs_f64(left));
         }
-        // What is later than that is lost: steps that catch up move the tool faster than it may go.
+        // A larger delay is lost: steps that catch up move the tool faster than it may go.
         let lost = -left - CATCHES_UP;
         if lost > 0.0 {
             self.due += lost;
@@ -466,8 +466,8 @@ fn words(report: &Report, pace: &Pace, estimate: &Estimate) -> String {
     )
 }
 
-/// The stiffest coupling on the model that was pressed most: what the theory says and what a simulated device
-/// holds.
+/// Finds the stiffest coupling on the model that was pressed most: the limit of the theory, and the limit of
+/// a simulated device.
 fn stiffest(model: &LocalModel, settings: Settings) -> Result<String, HapticsError> {
     let hand = Hand::default();
     // The time ahead damps as K times that, so it counts as a delay does.

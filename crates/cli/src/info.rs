@@ -21,9 +21,9 @@ const SAMPLES: f64 = 800.0;
 /// The shape of the surface of a mesh, if it has one.
 struct Shape {
     curvature: Option<Curvature>,
-    /// Of the body inside the surface.
+    /// Thickness of the body inside the surface.
     within: Option<Thickness>,
-    /// Of shells with data `thickness` [m].
+    /// Thickness of shells with data `thickness` [m].
     of_shells: Option<Percentiles>,
 }
 
@@ -32,7 +32,7 @@ struct Against {
     distances: Hausdorff,
     /// The farthest points of this mesh and of the other [m].
     farthest: [[f64; 3]; 2],
-    /// Of the other's box [m].
+    /// Diagonal of the other mesh's box [m].
     diagonal: f64,
 }
 

@@ -35,18 +35,18 @@ use clap::Parser;
 pub use pictures::{FinalPicture, look_of_world};
 pub use report::{Bar, Failure, say, tell};
 
-/// The code of a process that did what it was to do.
+/// Exit code of a process that succeeded.
 pub const SUCCESS: u8 = 0;
 
-/// Does what a command line says, whose first word is the program: prints, writes files, opens a window. The
-/// code that the process is to end with.
+/// Executes a command line, whose first word is the program: prints, writes files, opens a window. Returns
+/// the exit code.
 pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
     let wants_json = |arguments: &arguments::Arguments| arguments.command.wants_json();
     program(words, wants_json, |arguments| commands::execute(arguments.command))
 }
 
-/// Does what a command line says, of any program with commands: reads it, executes it, and prints errors, as
-/// an object on standard output, too, where that is promised. The code that the process is to end with.
+/// Executes a command line of any program with commands, and returns the exit code. Prints errors, also as an
+/// object on standard output if `wants_json` says so.
 pub fn program<A: Parser>(
     words: impl IntoIterator<Item = OsString>,
     wants_json: impl FnOnce(&A) -> bool,

@@ -20,7 +20,7 @@ pub fn prepare(path: &Path, overrides: &Overrides) -> Result<World, Failure> {
     prepare_changed(path, overrides, |_| {})
 }
 
-/// As [`prepare`], for a scene that is changed after reading.
+/// Works like [`prepare`], for a scene that is changed after reading.
 pub(crate) fn prepare_changed(
     path: &Path,
     overrides: &Overrides,
@@ -126,8 +126,8 @@ pub fn open(path: &Path, sandbox: bool, allow_partial: bool) -> Result<Opened, F
     Ok(Opened { source, folder: place, assumed: None, _translated: Some(folder) })
 }
 
-/// Writes a NiftySim model as a scene file with its meshes beside it; returns notes. A model with unsupported
-/// parts is rejected unless they may be omitted.
+/// Writes a NiftySim model as a scene file with its meshes next to it; returns notes. A model with
+/// unsupported parts is rejected unless they may be omitted.
 pub fn translate(
     model: &Path,
     reads: &Reads,

@@ -24,9 +24,9 @@ pub enum Failure {
     Scene(SceneErrors),
     /// Any other error, with a remedy.
     Plain {
-        /// What is wrong.
+        /// The mistake.
         message: String,
-        /// What helps.
+        /// The remedy.
         help: String,
     },
     /// Standard output can't be written; the input is valid (exit code 1).
@@ -127,7 +127,7 @@ const BETWEEN_LINES: Duration = Duration::from_secs(10);
 /// A progress bar with the time left and the real-time factor; without a terminal a line every ten seconds.
 pub struct Bar {
     bar: ProgressBar,
-    /// When the last line was written, or the work began; `None` with a terminal.
+    /// Time of the last line, or of the begin of the work; `None` with a terminal.
     last: Option<Mutex<Instant>>,
 }
 
@@ -143,7 +143,7 @@ impl Bar {
         Self { bar, last }
     }
 
-    /// Shows a part of the work from 0 to 1 and what is being done.
+    /// Shows the finished part of the work, from 0 to 1, and its present step.
     pub fn show(&self, part: f64, now: impl Into<Cow<'static, str>>) {
         let now = now.into();
         if let Some(last) = &self.last

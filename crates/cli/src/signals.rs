@@ -70,7 +70,7 @@ mod unix {
         }
     }
 
-    /// Whether a signal is not ignored: `nohup` ignores SIGHUP, which must stay ignored.
+    /// True if a signal is not ignored: `nohup` ignores SIGHUP, which must stay ignored.
     fn is_heeded(signal: i32) -> bool {
         let ignored = fs::read_to_string("/proc/self/status").ok().and_then(|status| {
             let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"))?;

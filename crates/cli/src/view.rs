@@ -98,7 +98,7 @@ fn finished_run(arguments: &View) -> Result<Option<FinishedRun>, Failure> {
     Ok(Some(FinishedRun { folder, series, portrait: portrait(arguments), size: arguments.size }))
 }
 
-/// When the window takes a picture of itself, and the file of this.
+/// Time at which the window takes a picture of itself, and the picture's file.
 fn portrait(arguments: &View) -> Option<(f64, PathBuf)> {
     arguments.screenshot.clone().map(|file| (arguments.after, file))
 }

@@ -1,7 +1,7 @@
 // Roots, lengths and sines to the last digits. A device may find a root with errors of some units in the last
-// place, which bend normals and shift gaps: a step of Newton's method takes them away, if `fma` is one
-// operation, and does no harm else. Its sine may have an absolute error of 2⁻¹¹, and has one of 2⁻²¹ on GPUs
-// of NVIDIA: more than a step turns a thing by.
+// place, which bend normals and shift gaps. A step of Newton's method removes these errors if `fma` is one
+// operation, and is harmless otherwise. The device's sine may have an absolute error of 2⁻¹¹, and has 2⁻²¹ on
+// GPUs of NVIDIA. Both are larger than the turn of a thing in a step.
 
 const HALF_TURN = 3.1415927;
 

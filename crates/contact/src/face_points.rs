@@ -1,5 +1,5 @@
 //! The points of a face that are kept out of a rigid thing, besides its corners. A ball or a capsule meets a
-//! face where the face is nearest to its centre or its axis: such a point goes along as the thing slides, so
+//! face where the face is nearest to its centre or its axis. Such a point moves along as the thing slides, so
 //! that its force does not jump. Other things meet the points of a lattice.
 
 use std::collections::BTreeSet;
@@ -13,17 +13,18 @@ use crate::touch::{lattice, parts_of};
 /// Square of the cosine of the angle to the axis of a capsule below which an edge goes along it.
 pub(crate) const ALONG: f64 = 0.5;
 
-/// Which points of the faces of a surface.
+/// Points of the faces of a surface that meet a rigid thing.
 #[derive(Clone, Debug)]
 pub enum FacePoints {
     /// These, by the weights of the corners; none where faces are small enough for the thing.
     Lattice(Vec<[f64; 3]>),
-    /// Those nearest to a ball or a capsule.
+    /// The points nearest to a ball or a capsule.
     Nearest(NearestPoints),
 }
 
 impl FacePoints {
-    /// Those of faces with edges up to a length [m] at a thing that bodies are outside of, or within.
+    /// Returns the points of faces with edges up to a length [m] at a thing that bodies are outside of, or
+    /// within.
     pub fn new(faces: &[[u32; 3]], longest: f64, shape: &Shape, inside: bool) -> Self {
         let all = lattice(parts_of(longest, shape));
         let (radius, half) = match *shape {
@@ -34,7 +35,7 @@ impl FacePoints {
         Self::Nearest(NearestPoints { radius, half, edges: first_edges(faces) })
     }
 
-    /// How many there are of a face at most.
+    /// Largest number of points of a face.
     pub fn most(&self) -> usize {
         match self {
             Self::Lattice(all) => all.len(),
@@ -52,8 +53,8 @@ impl FacePoints {
     }
 }
 
-/// The points of faces that are nearest to a ball or a capsule: all within a radius of a segment along z,
-/// which has no length if it is a ball.
+/// The points of faces that are nearest to a ball or a capsule. The thing is all within a radius of a segment
+/// along z, whose length is zero for a ball.
 #[derive(Clone, Debug)]
 pub struct NearestPoints {
     radius: f64,
@@ -64,8 +65,8 @@ pub struct NearestPoints {
 }
 
 impl NearestPoints {
-    /// The weights of the corners at those of a face, by its number, that are nearer than a room [m]; corners
-    /// [m] are in the frame of the thing.
+    /// Calls back with the weights of the corners at the points of a face, by its number, that are nearer to
+    /// the thing than a room [m]. Corners [m] are in the frame of the thing.
     pub fn of(&self, face: usize, corners: &[Vector3<f64>; 3], room: f64, mut found: impl FnMut([f64; 3])) {
         let reach = self.radius + room;
         let is_beyond = |c: usize, reach: f64| {
@@ -117,8 +118,9 @@ fn within(corners: &[Vector3<f64>; 3], half: f64, mut found: impl FnMut([f64; 3]
     }
 }
 
-/// Where on an edge, as a part of it, it is nearest to the segment: beside it or at one of its ends. Of an
-/// edge along the axis the points nearest to both ends count as well: it may touch all the way between them.
+/// Calls back with the place on an edge, from 0 to 1, that is nearest to the segment or to one of its ends.
+/// For an edge along the axis, the points nearest to both ends count: the edge may touch all the way between
+/// them.
 fn on_edge(from: Vector3<f64>, along: Vector3<f64>, half: f64, mut found: impl FnMut(f64)) {
     let mut take = |part: f64| {
         if part > 0.0 && part < 1.0 {
@@ -144,8 +146,8 @@ mod tests {
     use super::*;
     use pliant_testing::Random;
 
-    /// No point of a face is nearer to a ball or a capsule than the nearest of its corners and points, as
-    /// long as the axis does not go through it.
+    /// No point of a face is nearer to a ball or a capsule than the nearest of its corners and points. The
+    /// axis does not go through the face.
     #[test]
     fn no_point_of_a_face_is_nearer_than_those_found() {
         let mut random = Random::new(11);
@@ -196,7 +198,7 @@ mod tests {
         found
     }
 
-    /// As a ball slides along a strip of faces, the nearest point goes along beneath it.
+    /// The nearest point follows a ball that slides along a strip of faces.
     #[test]
     fn nearest_points_go_along_with_a_thing_that_slides() {
         for step in 0..=1000 {

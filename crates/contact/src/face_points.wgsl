@@ -48,7 +48,7 @@ fn nearest_weights(a: vec3f, b: vec3f, c: vec3f, p: vec3f) -> vec3f {
     return vec3f(1.0 - v - w, v, w);
 }
 
-// Whether the points of faces at a thing are those nearest to it.
+// True if the points of faces at a thing are the nearest ones.
 fn takes_nearest(thing: u32) -> bool {
     let kind = u32(thing_number(thing));
     return (HAS_SPHERE && kind == SPHERE || HAS_CAPSULE && kind == CAPSULE) && thing_number(thing + 1u) > 0.0;
@@ -62,8 +62,8 @@ fn weights_within(corners: array<vec3f, 3>, end: f32) -> vec3f {
     return select(vec3f(0.0), weights, all(weights > vec3f(0.0)) && height * end >= 0.0);
 }
 
-// Where on an edge, as a part of it, it is nearest to the segment: the first of three is beside it, the
-// others are at its ends. Zero of none.
+// Returns the place on an edge, from 0 to 1, that is nearest to the segment. The first of three lies along
+// the segment, the others are nearest to its ends. Zero if there is no such place.
 fn part_of_edge(edge: vec3f, along: vec3f, half: f32, which: u32) -> f32 {
     let squared = dot(along, along);
     let across = dot(along.xy, along.xy);
@@ -79,8 +79,8 @@ fn part_of_edge(edge: vec3f, along: vec3f, half: f32, which: u32) -> f32 {
     return 0.0;
 }
 
-// The weights of the corners at a point of a face, with the corners in the frame of the thing, and the edges
-// that no other face has before it as bits; zero where there is no point.
+// Returns the weights of the corners at a point of a face, with the corners in the frame of the thing. The
+// bits of `edges` are the edges that no face before this one has. Zero where there is no point.
 fn nearest_point(thing: u32, point: u32, edges: u32, corners: array<vec3f, 3>) -> vec3f {
     var half = 0.0;
     if HAS_CAPSULE && u32(thing_number(thing)) == CAPSULE {

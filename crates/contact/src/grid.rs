@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use crate::near::{Near, Triangles};
 
 /// Signed distances [m] at the points of a regular grid, linear in between along each axis. Beyond the grid
-/// the distance is that to the point of the surface that is nearest to the rim of the grid.
+/// the distance is measured to the point of the surface that is nearest to the rim of the grid.
 #[derive(Clone)]
 pub struct Grid {
     origin: Vector3<f64>,
@@ -37,14 +37,14 @@ impl fmt::Debug for Grid {
     }
 }
 
-/// How far the slope may be below 1, that of a distance, and is still mended; it is where the direction to
-/// the surface jumps.
+/// Largest defect of the slope, which is 1 for a distance, that is corrected. A larger defect means that the
+/// direction to the surface jumps.
 pub(crate) const FLATTEST: f64 = 0.3;
 
 impl Grid {
-    /// Of distances [m] at the points of a grid from `origin` [m] on, negative inside, x fastest. `None` if
-    /// their number is not that of the points, one of them or a length is not finite, or there are fewer than
-    /// two points along an axis.
+    /// Makes a grid of distances [m] at points from `origin` [m] on, negative inside, x fastest. `None` if
+    /// the number of values and of points differ, a value or a length is not finite, or an axis has fewer
+    /// than two points.
     pub fn new(origin: Vector3<f64>, spacing: f64, counts: [usize; 3], values: Vec<f32>) -> Option<Self> {
         let points = counts.iter().try_fold(1_usize, |points, &count| points.checked_mul(count))?;
         let sound = points == values.len()
@@ -90,12 +90,12 @@ impl Grid {
         Self::new(low, spacing, counts, values)
     }
 
-    /// The same with the least distance [m] that a point can go through the shape; the spacing if not given.
+    /// Sets the least distance [m] that a point can go through the shape. The default is the spacing.
     pub fn with_thinnest(self, thinnest: f64) -> Self {
         Self { thinnest: thinnest.max(self.spacing), ..self }
     }
 
-    /// The same with a surface to be drawn; nothing if not given.
+    /// Sets a surface to be drawn. The default is no surface.
     pub fn with_surface(self, surface: Triangles) -> Self {
         Self { surface, ..self }
     }
@@ -170,9 +170,9 @@ impl Grid {
         self.beyond([&along, &inner], distance, normal)
     }
 
-    /// The distance at a point [m] by splines of second degree, and its gradient, which is continuous, as
-    /// that of [`near`](Self::near) is not. They round corners by about the spacing, where the gradient is
-    /// shorter than 1.
+    /// The distance at a point [m] by splines of second degree, and its gradient. This gradient is
+    /// continuous, unlike the gradient of [`near`](Self::near). Splines round corners by about the spacing,
+    /// where the gradient is shorter than 1.
     pub fn smooth(&self, point: &Vector3<f64>) -> Near {
         let along = (point - self.origin) * self.per_metre;
         let last = Vector3::from_fn(|c, _| (self.counts[c] - 1) as f64);
@@ -252,9 +252,9 @@ mod tests {
         Grid::sample([-corner, corner], spacing, |x| x.norm() - RADIUS).unwrap()
     }
 
-    /// Linear interpolation of a function with the second derivatives 1/r, 1/r, 0 is off by at most 2 h²/(8
-    /// r) within a cell, times the diagonals of its directions: never above 3 h²/(8 r). Halving the spacing
-    /// quarters it.
+    /// Take a function with the second derivatives 1/r, 1/r, 0. Its linear interpolation is off by at most 2
+    /// h²/(8 r) within a cell, times the diagonals of its directions: never above 3 h²/(8 r). Halving the
+    /// spacing quarters the error.
     #[test]
     fn a_sampled_ball_is_a_ball_to_second_order() {
         let worst = [0.008, 0.004, 0.002, 0.001].map(|spacing| {
@@ -327,8 +327,7 @@ mod tests {
         assert!(Grid::sample([Vector3::zeros(), Vector3::repeat(1.0)], 0.5, |_| f64::NAN).is_none());
     }
 
-    /// Two grids that differ in one value are told apart by what they show of themselves, as checkpoints
-    /// need.
+    /// Two grids that differ in one value have different debug texts, as checkpoints need.
     #[test]
     fn another_value_is_another_grid() {
         let mut values = vec![1.0; 27];

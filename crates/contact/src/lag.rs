@@ -1,9 +1,9 @@
 //! Tools and moved nodes that push with no more than a force: how far they lag behind their trajectory.
 //!
-//! A hand that meets something stiffer than it can bear comes to rest there, and goes along again when it is
-//! called back. So does a tool with a limit: of the way that it would go against what it pushes, it goes a
-//! part that falls from 1 at half of the limit over 0 at the limit to −1. What it did not go is its lag,
-//! which it makes good over time.
+//! A hand that meets something stiffer than it can bear comes to rest there, and moves again when it is
+//! called back. A tool with a limit does the same. It goes a part of its way against what it pushes. The part
+//! falls from 1 at half of the limit over 0 at the limit to −1. The rest of the way is its lag, which it
+//! makes good over time.
 //!
 //! ```
 //! use nalgebra::Vector3;
@@ -26,14 +26,14 @@ use serde::{Deserialize, Serialize};
 
 /// Time [s] in which most of a lag is made good where nothing is in the way.
 const CATCHES_UP: f64 = 0.3;
-/// Time [s] over which forces are averaged: those of single steps jump where nodes come and go.
+/// Time [s] over which forces are averaged: forces of single steps jump where nodes enter or leave contact.
 const FELT: f64 = 0.01;
 
 /// The lag of a rigid thing or of moved nodes behind their trajectory.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Lag {
     number: u32,
-    /// From its place on the trajectory to where it is [m], now and after the step.
+    /// Way [m] from its place on the trajectory to its real place, before and after the step.
     ways: [[f64; 3]; 2],
     /// The force [N] with which it pushes: on average until the step before, and in this one.
     forces: [[f64; 3]; 2],
@@ -44,8 +44,8 @@ pub struct Lag {
 }
 
 impl Lag {
-    /// Of a thing, by its place among the rigid things of the contacts, or of moved nodes, by that of their
-    /// constraint in its model.
+    /// Makes a lag without way. `number` is the index of a thing among the rigid things of the contacts, or
+    /// of the constraint of moved nodes in its model.
     pub fn new(number: u32) -> Self {
         Self { number, ways: [[0.0; 3]; 2], forces: [[0.0; 3]; 2], step: 0.0, longest: (0.0, 0.0) }
     }
@@ -55,12 +55,12 @@ impl Lag {
         self.number as usize
     }
 
-    /// From its place on the trajectory to where it is [m].
+    /// Returns the way [m] from its place on the trajectory to its real place.
     pub fn now(&self) -> Vector3<f64> {
         self.ways[0].into()
     }
 
-    /// The same after the step.
+    /// Returns the lag [m] after the step.
     pub fn next(&self) -> Vector3<f64> {
         self.ways[1].into()
     }
@@ -87,8 +87,9 @@ impl Lag {
         self.go(self.force(), Self::part(self.force().norm(), limit), way, step);
     }
 
-    /// Finds the lag after a step of a length [s], over which the trajectory goes a way [m], when of what
-    /// leads along a force [N] with which it pushes it goes a part. How long [m] the whole of that is.
+    /// Finds the lag after a step of a length [s], over which the trajectory goes a way [m]. The thing goes
+    /// only a part of the way along the force [N] with which it pushes. Returns the full length [m] of that
+    /// way.
     pub fn go(&mut self, force: Vector3<f64>, part: f64, way: Vector3<f64>, step: f64) -> f64 {
         let mut wanted = way - self.now() * (step / CATCHES_UP).min(1.0);
         let ahead = force.try_normalize(0.0).unwrap_or_default();
@@ -109,7 +110,7 @@ impl Lag {
         self.forces[1] = force.into();
     }
 
-    /// Goes on to the end of the step, a time [s].
+    /// Advances to the end of the step, a time [s].
     pub fn advance(&mut self, time: f64) {
         self.ways[0] = self.ways[1];
         let [mean, found] = self.forces.map(Vector3::from);
@@ -120,7 +121,7 @@ impl Lag {
         }
     }
 
-    /// Whether all of its numbers are finite.
+    /// True if all numbers are finite.
     pub fn is_finite(&self) -> bool {
         let numbers = self.ways.iter().chain(&self.forces).flatten();
         numbers.chain([&self.step, &self.longest.0, &self.longest.1]).all(|x| x.is_finite())

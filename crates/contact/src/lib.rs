@@ -1,8 +1,8 @@
-//! Contact of soft bodies. With rigid things: [shapes](shape) with their signed distance, [motions](pose) of
-//! obstacles and tools, and the [least correction](touch) of a node that would go into one, with friction.
-//! With each other and themselves: [pairs] of points of their surfaces, found by [trees](tree). For solvers
-//! of equations, a [barrier] between them that nothing passes. Knows no solver: how a contact acts is the
-//! stepper's. SI units throughout.
+//! Contact of soft bodies with rigid things, with each other and with themselves. For rigid things there are
+//! [shapes](shape) with their signed distance and [motions](pose) of obstacles and tools. A node that would
+//! go into a thing gets the [least correction](touch), with friction. For soft surfaces, [pairs] of their
+//! points are found by [trees](tree). For solvers of equations there is a [barrier] that no surface passes.
+//! This crate has no solver: the stepper applies the contacts. SI units throughout.
 //!
 //! A node falls onto a plane:
 //!

@@ -1,10 +1,10 @@
-//! Where two deformable surfaces, or parts of a surface, come near each other: a node above a triangle, and
-//! two edges that cross. Distances are signed by the outward side of the surfaces, so that a small overlap is
-//! seen as such.
+//! Pairs of two deformable surfaces, or parts of a surface, that come near each other: a node above a
+//! triangle, and two edges that cross. The outward side of the surfaces gives the sign of a distance, so that
+//! a small overlap is seen as one.
 //!
 //! Trees of triangles and edges give lists of candidates. These hold until a node has moved by half of a
-//! margin, the skin: till then they have all that a step looks at, so that results do not depend on when they
-//! were made. They do not depend on the order of bodies or threads either.
+//! margin, the skin. Till then they contain all pairs of a step, so that results do not depend on when they
+//! were made. Results do not depend on the order of bodies or threads either.
 //!
 //! A node is compared with each triangle that it lies above or beneath, and with the nearest edge or corner
 //! if that is nearer still. Two edges count where the normal between them is in the cones of normals of both
@@ -22,26 +22,27 @@ pub use narrow::Edge;
 use narrow::{Above, Across, is_beyond};
 pub(crate) use narrow::{FLAT, PARALLEL};
 
-/// How far beyond the distance to keep pairs are found, over the mean edge.
+/// Distance beyond the one to keep within which pairs are found, over the mean edge.
 const REACH: f64 = 0.25;
 /// The skin of the lists, over the mean edge.
 const SKIN: f64 = 0.25;
-/// What lists hold, over the skin: the rest is round-off of single precision.
+/// Margin that lists contain, over the skin: the excess is for round-off of single precision.
 const HELD: f64 = 1.01;
-/// What nodes have moved, for the round-off of single precision.
+/// Factor on the ways of nodes, for the round-off of single precision.
 const ROUND_OFF: f64 = 1.0 + 1e-6;
 /// Overlap, over the mean edge, up to which a surface is seen from behind.
 const DEPTH: f64 = 0.25;
 /// The cosine of the angle between outward normals up to which surfaces face each other.
 pub(crate) const FACING: f64 = 0.3;
-/// How far beside a triangle, over its height, a node whose surface faces it still counts as above it: bodies
-/// with common borders hold each other there, and do not take hold of each other's sides.
+/// Distance beside a triangle, over its height, within which a node still counts as above it if its surface
+/// faces the triangle. Bodies with common borders hold each other there, and do not catch on each other's
+/// sides.
 pub(crate) const BESIDE: f64 = 0.02;
 /// Overlap, over the deepest one, that is undone though a side that faces away is nearer.
 pub(crate) const SLIGHT: f64 = 0.1;
-/// Distance from a triangle, edge or corner, over the overlap up to which a surface is seen from behind, at
-/// which a node lies on it: it is not beneath, and the way from there tells no direction. Impulses that are
-/// found leave less than that, and round-off of single precision is less.
+/// Distance from a triangle, edge or corner at which a node lies on it, over the overlap up to which a
+/// surface is seen from behind. Such a node is not beneath, and the way to it has no usable direction.
+/// Impulses leave a smaller distance, and round-off of single precision is smaller too.
 pub(crate) const ON: f64 = 1e-4;
 /// Relative difference up to which distances are the same.
 const SAME: f64 = 1e-9;
@@ -58,7 +59,7 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// The same with other numbers of its nodes, in the same order.
+    /// Returns the surface with other numbers of its nodes, in the same order.
     pub fn numbered(&self, number: impl Fn(u32) -> u32) -> Self {
         let faces = self.faces.iter().map(|face| face.map(&number)).collect();
         Self { nodes: self.nodes.iter().map(|&node| number(node)).collect(), faces }
@@ -71,12 +72,12 @@ impl Surface {
     }
 }
 
-/// A point of one surface beside a point of another.
+/// A near pair: a point of one surface and a point of another.
 #[derive(Clone, Copy, Debug)]
 pub struct Pair {
     /// Nodes that take part: a node and the corners of a triangle, or the ends of two edges.
     pub nodes: [u32; 4],
-    /// Σ wᵢ xᵢ is the way [m] from the point of the second to that of the first.
+    /// Weights w: Σ wᵢ xᵢ is the way [m] from the point of the second primitive to the point of the first.
     pub weights: [f64; 4],
     /// Outward from the second.
     pub normal: Vector3<f64>,
@@ -84,7 +85,7 @@ pub struct Pair {
     pub distance: f64,
     /// The distance [m] that both keep.
     pub kept: f64,
-    /// Whether the first belongs to the first of two surfaces.
+    /// True if the first primitive belongs to the first of two surfaces.
     pub in_order: bool,
 }
 
@@ -92,9 +93,9 @@ pub struct Pair {
 pub struct Point<'p> {
     /// The node.
     pub node: u32,
-    /// The triangles of its own surface around it: each by its other corners, in order.
+    /// The triangles of its surface around the node: each by its other corners, in order.
     pub ring: &'p [[u32; 2]],
-    /// Whether it belongs to the first of two surfaces.
+    /// True if the node belongs to the first of two surfaces.
     pub in_order: bool,
     list: &'p [[u32; 2]],
     other: &'p Side,
@@ -116,8 +117,8 @@ struct Side {
     edges: Vec<Edge>,
     /// Nodes at borders of an open surface, increasing.
     border: Vec<u32>,
-    /// Triangles around the nodes, one node after the other: each by its other corners, in order. Where those
-    /// of each node end.
+    /// Triangles around the nodes, one node after the other: each by its other corners, in order. `ring_ends`
+    /// has the end of each node's triangles.
     rings: Vec<[u32; 2]>,
     ring_ends: Vec<usize>,
     face_tree: Tree,
@@ -207,7 +208,7 @@ pub struct Pairs {
     offset: f64,
     /// The distance [m] that each node keeps, by its number; the same of all nodes beyond its end.
     kept: Vec<f64>,
-    /// How far [m] beyond that pairs are found.
+    /// Distance [m] beyond the one to keep within which pairs are found.
     reach: f64,
     skin: f64,
     depth: f64,
@@ -215,8 +216,8 @@ pub struct Pairs {
     points: [Vec<[u32; 2]>; 2],
     /// Edges of the first with edges of the second.
     crossings: Vec<[u32; 2]>,
-    /// How far [m] beyond what a step looks at candidates were apart when they were listed: points by boxes,
-    /// then crossings.
+    /// Distance [m] of candidates beyond the range of a step, when they were listed: points by boxes, then
+    /// crossings.
     room: [Vec<f32>; 3],
     /// Candidates of one surface that never touch, since they are too near at rest: nodes with triangles,
     /// edges with edges.
@@ -225,8 +226,8 @@ pub struct Pairs {
 }
 
 impl Pairs {
-    /// Of two surfaces that keep a distance [m], or of a surface with itself; `place` is where nodes are at
-    /// rest [m]. Nodes of surfaces are increasing.
+    /// Makes the pairs of two surfaces that keep a distance [m], or of a surface with itself. `place` gives
+    /// the rest places [m] of nodes. Nodes of surfaces are increasing.
     pub fn new(
         first: &Surface,
         second: Option<&Surface>,
@@ -272,8 +273,8 @@ impl Pairs {
         self
     }
 
-    /// Nodes of pairs whose distance is less than the one to keep, whichever way they look, with the least
-    /// distance [m]. Of two edges those of the first count.
+    /// Returns the nodes of pairs whose distance is less than the one to keep, whichever way they look, with
+    /// the least distance [m]. For two edges, the nodes of the first count.
     pub fn nearer(&mut self, place: impl Fn(u32) -> Vector3<f64>) -> Vec<(u32, f64)> {
         self.list_again(&place);
         let mut least = BTreeMap::<u32, f64>::new();
@@ -318,8 +319,8 @@ impl Pairs {
         first.min(second).clamp(0.0, self.offset)
     }
 
-    /// Finds the parts of a surface that are nearer each other at rest than a distance [m]: beside each
-    /// other, or on both sides of a thin part.
+    /// Finds the parts of a surface that are nearer each other at rest than a distance [m]. They are
+    /// neighbours, or on both sides of a thin part.
     fn set_apart(&mut self, place: &impl Fn(u32) -> Vector3<f64>, keep: f64) {
         self.list(place, keep.max(2.0 * self.depth) + self.skin);
         let side = &self.sides[0];
@@ -340,12 +341,12 @@ impl Pairs {
         self.sides.iter_mut().for_each(|side| side.listed.clear());
     }
 
-    /// How many candidates of a surface never touch each other since they are too near at rest.
+    /// Number of candidates of a surface that never touch each other because they are too near at rest.
     pub fn set_apart_count(&self) -> usize {
         self.apart.iter().map(Vec::len).sum()
     }
 
-    /// How far [m] away, by its box, what a node or an edge is compared with can be.
+    /// Returns the range [m] of a node or an edge: boxes of its partners are within that distance.
     fn within(&self) -> f64 {
         (self.offset + self.reach).max(self.depth)
     }
@@ -364,7 +365,7 @@ impl Pairs {
         0.5 * self.skin
     }
 
-    /// Lists what is within a reach [m] by its boxes.
+    /// Lists candidates whose boxes are within a reach [m].
     fn list(&mut self, place: &impl Fn(u32) -> Vector3<f64>, reach: f64) {
         self.sides.iter_mut().for_each(|side| side.take_places(place));
         let within = self.within();
@@ -462,8 +463,8 @@ impl Pairs {
         self.crossings.iter().map(move |&[a, b]| [edge(&self.sides[0], a), edge(self.other(0), b)])
     }
 
-    /// What is nearer than the reach beyond the distance to keep, with nodes at these places [m]. These alone
-    /// decide what is found, as long as the lists hold.
+    /// Calls back with the pairs that are nearer than the reach beyond the distance to keep, with nodes at
+    /// places [m]. As long as the lists hold, the result depends on these places alone.
     pub fn find(&self, place: impl Fn(u32) -> Vector3<f64>, mut found: impl FnMut(Pair)) {
         let (limit, within) = (self.offset + self.reach, self.within());
         let wanted = |pair: &Pair| -self.depth < pair.distance && pair.distance < limit;
@@ -515,8 +516,8 @@ impl Pairs {
         }
     }
 
-    /// Of a node, by its place in its surface, with the triangles that may be near it; `rows` is room for
-    /// pairs.
+    /// Calls back with the pairs of a node, by its index in its surface, and the triangles that may be near
+    /// it. `rows` is memory for pairs.
     fn find_above(
         &self,
         (own, side): (usize, &Side),
@@ -581,11 +582,11 @@ impl Pairs {
     }
 }
 
-/// What a node sees of a surface.
+/// The triangles and edges of a surface that a node meets.
 struct Seen<'r> {
-    /// Of the triangles that it lies beneath, the nearest one: whoever is inside leaves by the shortest way.
+    /// Pair with the nearest triangle above the node: a node inside leaves by the shortest way.
     beneath: Option<Pair>,
-    /// The least distance [m] from those that it lies above, or on.
+    /// The least distance [m] from the triangles that it lies above, or on.
     above: f64,
     /// The overlap [m] up to which it lies on a triangle.
     on: f64,
@@ -612,7 +613,7 @@ struct Nearest {
     way: Vector3<f64>,
     /// The sum of the normals of its triangles.
     normals: Vector3<f64>,
-    /// Whether one of these does not face away.
+    /// True if one of these triangles does not face away.
     faces: bool,
     /// The first of its triangles, and the weights in it.
     face: u32,
@@ -628,7 +629,7 @@ impl Default for Nearest {
 }
 
 impl Nearest {
-    /// Takes what is nearest of a triangle, if nothing was nearer.
+    /// Takes the nearest point of a triangle, if nothing was nearer.
     #[inline]
     fn take(&mut self, face: u32, here: &Above, faces_away: bool) {
         let distance = here.distance();
@@ -646,9 +647,9 @@ impl Nearest {
     #[inline]
     fn outward(&self, surface: &Side, on: f64) -> Option<(Vector3<f64>, f64)> {
         let Self { distance, way, normals, .. } = self;
-        // In one plane with a triangle, beside it, is not beneath it.
+        // A node in the plane of a triangle, but outside the triangle, is not beneath it.
         let sign = if way.dot(normals) < -SAME * distance * normals.norm() { -1.0 } else { 1.0 };
-        // Who is behind a border is beside the surface.
+        // A node behind a border is beside the surface.
         let nodes = surface.faces[self.face as usize];
         let mut at = nodes.iter().zip(&self.weights).filter(|(_, weight)| **weight != 0.0);
         let beside = sign < 0.0 && at.all(|(node, _)| surface.border.binary_search(node).is_ok());

@@ -1,4 +1,4 @@
-//! Where rigid things are over time.
+//! Places of rigid things over time.
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use pliant_mechanics::curve::Curve;
@@ -7,12 +7,12 @@ use serde::{Deserialize, Serialize};
 /// A position and an orientation.
 pub type Pose = Isometry3<f64>;
 
-/// Where a rigid thing is, and by how much it has grown.
+/// Pose of a rigid thing, and its growth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stance {
-    /// Where its frame is.
+    /// Pose of its frame.
     pub pose: Pose,
-    /// How far [m] its surface is outside of that of its shape.
+    /// Distance [m] that its surface has grown outside the surface of its shape.
     pub growth: f64,
 }
 
@@ -29,10 +29,10 @@ impl Stance {
     }
 }
 
-/// How a rigid thing moves and grows.
+/// Motion and growth of a rigid thing over time.
 #[derive(Clone, Debug)]
 pub struct Trajectory {
-    /// Where it is at the start.
+    /// Pose at the start.
     start: Pose,
     motion: Motion,
     /// A distance [m] by which its surface moves outward as a curve goes.
@@ -62,23 +62,24 @@ impl Trajectory {
         Self { start, motion, growth: None, limit: None }
     }
 
-    /// With a surface that moves outward by a distance [m] as a curve goes from 0 to 1.
+    /// Returns the trajectory with a surface that moves outward by a distance [m] as a curve goes from 0
+    /// to 1.
     pub fn growing(self, by: f64, curve: Curve) -> Self {
         Self { growth: Some((by, curve)), ..self }
     }
 
-    /// How far [m] the surface has moved outward at a time [s].
+    /// Distance [m] that the surface has moved outward at a time [s].
     pub fn growth(&self, time: f64) -> f64 {
         self.growth.as_ref().map_or(0.0, |(by, curve)| by * curve.value(time))
     }
 
-    /// Whether the surface moves outward or inward.
+    /// True if the surface moves outward or inward.
     pub fn grows(&self) -> bool {
         self.growth.is_some()
     }
 
-    /// With a force [N] that the thing pushes with at most: it lags behind its trajectory where it would need
-    /// more.
+    /// Returns the trajectory with the largest force [N] that the thing pushes with. Where the thing would
+    /// need more, it lags behind its trajectory.
     pub fn limited(self, force: f64) -> Self {
         Self { limit: Some(force), ..self }
     }
@@ -111,7 +112,7 @@ impl Trajectory {
         (increase && !poses.is_empty()).then_some(Self::of(start, Motion::Table(poses)))
     }
 
-    /// Whether it moves or grows at all.
+    /// True if the thing moves or grows at any time.
     pub fn moves(&self) -> bool {
         self.grows() || !matches!(self.motion, Motion::Fixed)
     }
@@ -140,16 +141,16 @@ impl Trajectory {
     }
 }
 
-/// A pose on the straight way and the shortest arc from one to another, after a part of it.
+/// Returns the pose after a part of the straight way and the shortest arc from one pose to another.
 pub fn between([from, to]: [&Pose; 2], part: f64) -> Pose {
     let place = from.translation.vector.lerp(&to.translation.vector, part);
     let turn = from.rotation.try_slerp(&to.rotation, part, 1e-12).unwrap_or(to.rotation);
     Pose::from_parts(place.into(), turn)
 }
 
-/// Where a tool goes that is driven from outside: its pose on a straight way and the shortest arc, the angle
-/// between its jaws evenly. At the goal it stays. Pose and angle have a way each; without one, they follow
-/// the trajectory.
+/// Way of a tool that is driven from outside. Its pose moves on a straight way and the shortest arc, and the
+/// angle between its jaws changes evenly. At the goal it stays. Pose and angle have a way each; without one,
+/// they follow the trajectory.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Leg {
     /// Positions [m] and unit quaternions (i, j, k, w).
@@ -161,7 +162,7 @@ pub struct Leg {
 /// A way from one value to another.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Way<T> {
-    /// When it begins and ends [s].
+    /// Times [s] at which the way begins and ends.
     times: [f64; 2],
     ends: [T; 2],
 }
@@ -175,18 +176,18 @@ impl<T> Way<T> {
 }
 
 impl Leg {
-    /// From a pose to another between two times [s].
+    /// Makes a leg from one pose to another between two times [s].
     pub fn to_pose(times: [f64; 2], poses: [Pose; 2]) -> Self {
         let plain = |pose: Pose| (pose.translation.vector.into(), pose.rotation.coords.into());
         Self { pose: Some(Way { times, ends: poses.map(plain) }), opening: None }
     }
 
-    /// From an angle [rad] between jaws to another between two times [s].
+    /// Makes a leg from one angle [rad] between jaws to another between two times [s].
     pub fn to_opening(times: [f64; 2], angles: [f64; 2]) -> Self {
         Self { pose: None, opening: Some(Way { times, ends: angles }) }
     }
 
-    /// The same, with the way of `before` for what has none.
+    /// Returns the leg with the missing ways taken from `before`.
     pub fn or(self, before: &Self) -> Self {
         Self { pose: self.pose.or(before.pose), opening: self.opening.or(before.opening) }
     }
@@ -210,7 +211,7 @@ impl Leg {
         })
     }
 
-    /// Whether all of its numbers are finite.
+    /// True if all numbers are finite.
     pub fn is_finite(&self) -> bool {
         let poses = self.pose.iter().flat_map(|way| {
             let of_poses = way.ends.iter().flat_map(|(place, turn)| place.iter().chain(turn));

@@ -1,6 +1,6 @@
-//! Pressures of contacts on single nodes: p = |N|/A. N is the sum of what contacts push a node by along their
-//! normals, and A = Σ ⅓ max(0, −a·N/|N|) is its share of the vector areas a of its deformed faces, outward,
-//! that N presses on.
+//! Pressures of contacts on single nodes: p = |N|/A. N is the sum of the contact forces on a node along their
+//! normals. A = Σ ⅓ max(0, −a·N/|N|) is the node's share of the area that N presses on. Here a are the
+//! outward vector areas of its deformed faces.
 
 use nalgebra::Vector3;
 

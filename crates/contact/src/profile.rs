@@ -1,5 +1,5 @@
 //! The outline of a body of revolution: lines and arcs in the half-plane of height and distance from the
-//! axis, without corners, so that the direction of the signed distance is continuous near the surface.
+//! axis. It has no corners, so that the direction of the signed distance is continuous near the surface.
 
 use nalgebra::Vector2;
 
@@ -12,7 +12,7 @@ pub struct Corner {
     pub rounding: f64,
 }
 
-/// Why corners make no outline.
+/// Reasons why corners make no outline.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ProfileError {
     /// Too few corners.
@@ -37,10 +37,10 @@ pub enum ProfileError {
 /// A piece of the outline.
 #[derive(Clone, Copy, Debug)]
 enum Piece {
-    /// From a point along a unit direction over a length [m], with the direction to its outside.
+    /// A line from a point along a unit direction over a length [m], with the direction to its outside.
     Line { from: Vector2<f64>, along: Vector2<f64>, length: f64, out: Vector2<f64> },
-    /// Around a centre, with the unit direction to its middle and the cosine of half of its angle. What is
-    /// round is outside: −1, or inside: 1.
+    /// Around a centre, with the unit direction to its middle and the cosine of half of its angle. The sign
+    /// is 1 for a convex arc and −1 for a concave one.
     Arc { centre: Vector2<f64>, middle: Vector2<f64>, cosine: f64, radius: f64, sign: f64 },
 }
 
@@ -53,7 +53,7 @@ pub struct Profile {
 }
 
 impl Profile {
-    /// That of corners from below upwards.
+    /// Makes the outline of corners from below upwards.
     ///
     /// # Errors
     /// If there are less than two, one is beyond the axis, or arcs don't fit between them.
@@ -159,7 +159,8 @@ impl Profile {
         best
     }
 
-    /// Points (r, z) [m] along it, with so many on each arc, from the axis to the axis if it ends there.
+    /// Points (r, z) [m] along the outline, with `on_arc` points on each arc, from the axis to the axis if
+    /// the outline ends there.
     pub(crate) fn drawn(&self, on_arc: u32) -> Vec<[f64; 2]> {
         let mut points = Vec::new();
         let mut arcs = self.pieces.iter().filter_map(|piece| match piece {

@@ -9,7 +9,7 @@ use crate::pairs::{BESIDE, FACING, FLAT, ON, PARALLEL, SLIGHT};
 use crate::shape::Shape;
 use crate::touch::{ALIKE, LEFT, MEETS, MOST_PARTS, Passage, Rigid};
 
-/// Numbers of a rigid thing, without those of its grid.
+/// Number of values of a rigid thing, without the values of its grid.
 pub const THING: usize = 16;
 
 /// Numbers of a passage.
@@ -18,7 +18,7 @@ pub const PASSAGE: usize = 40;
 /// Half of the thinnest part [m] of a thing without one.
 const ENDLESS: f64 = 1e30;
 
-/// The kind of a shape, by its place here; a half-space is what is none of these.
+/// Kinds of shapes, by their index; any other index is a half-space.
 const KINDS: [&str; 6] = ["SPHERE", "CAPSULE", "CYLINDER", "CUBOID", "CONE", "GRID"];
 
 fn kind(shape: &Shape) -> usize {
@@ -34,11 +34,12 @@ fn kind(shape: &Shape) -> usize {
     }
 }
 
-/// What bodies find at these rigid things, in WGSL.
+/// Returns the contact functions of bodies with these rigid things, in WGSL.
 ///
-/// The module around it defines `fn thing_number(at: u32) -> f32` and `fn passage_number(at: u32) -> f32`,
-/// the numbers of [`things`] and of [`Passage::numbers`]. It gives `passage_of(thing, at)`, from where the
-/// numbers of both begin, and of a passage `near_after`, `distance_before`, `meet` and `carried`.
+/// The module around it defines `fn thing_number(at: u32) -> f32` and `fn passage_number(at: u32) -> f32`.
+/// These read the numbers of [`things`] and of [`Passage::numbers`]. The shader gives
+/// `passage_of(thing, at)`, whose arguments are the begins of both. For a passage it gives `near_after`,
+/// `distance_before`, `meet` and `carried`.
 pub fn shader(rigids: &[Rigid]) -> String {
     let numbers = [
         ("FLATTEST", FLATTEST),
@@ -62,8 +63,8 @@ fn constants(numbers: &[(&str, f64)]) -> String {
     numbers.iter().map(|(name, value)| format!("const {name} = {:e}f;\n", *value as f32)).collect()
 }
 
-/// What surfaces find at each other, in WGSL: `find_above` of a node with triangles, and `find_crossing` of
-/// two edges.
+/// Returns the contact functions of surfaces with each other, in WGSL: `find_above` of a node with triangles,
+/// and `find_crossing` of two edges.
 ///
 /// The surrounding module includes the [`shader`] of rigid things, and defines where nodes are and how a pair
 /// is stored; see narrow.wgsl.
@@ -79,8 +80,8 @@ pub fn pairs_shader() -> String {
     [&constants(&numbers), include_str!("pairs/narrow.wgsl")].join("\n")
 }
 
-/// Points of faces at balls and capsules, in WGSL, beside [`shader`]: `takes_nearest` of a thing, and
-/// `nearest_point` of a face.
+/// Returns the functions for points of faces at balls and capsules, in WGSL, to go with [`shader`]:
+/// `takes_nearest` of a thing, and `nearest_point` of a face.
 pub fn face_points_shader() -> String {
     [&constants(&[("ALONG", ALONG)]), include_str!("face_points.wgsl")].join("\n")
 }
@@ -119,7 +120,8 @@ pub fn things(rigids: &[Rigid]) -> Vec<f32> {
 }
 
 impl Passage {
-    /// As `passage_number` gives it. Differences are found in double precision, so that no digits are lost.
+    /// Returns the numbers that `passage_number` reads. Differences are taken in double precision, so that no
+    /// digits are lost.
     pub fn numbers(&self) -> [f32; PASSAGE] {
         let [before, after] = &self.poses;
         let place = before.translation.vector;

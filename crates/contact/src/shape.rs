@@ -1,4 +1,4 @@
-//! Rigid shapes, each in a frame of its own, with their signed distance.
+//! Rigid shapes, each in its frame, with their signed distance.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -17,7 +17,7 @@ pub enum Shape {
         /// Its radius [m].
         radius: f64,
     },
-    /// All within a radius of a segment along z, centred at the origin.
+    /// The points within a radius of a segment along z, centred at the origin.
     Capsule {
         /// Its radius [m].
         radius: f64,
@@ -43,7 +43,7 @@ pub enum Shape {
         /// Its height [m].
         height: f64,
     },
-    /// All below the plane z = 0.
+    /// The points below the plane z = 0.
     HalfSpace,
     /// A body of revolution about the z axis.
     Revolved(Arc<Profile>),
@@ -51,7 +51,7 @@ pub enum Shape {
     Grid(Arc<Grid>),
 }
 
-/// Sides of a shape that has most of them, a box.
+/// Largest number of sides of a shape: the sides of a box.
 const MOST_SIDES: usize = 6;
 
 /// Smooth sides of a shape, the first places of the array.
@@ -81,8 +81,8 @@ impl Shape {
         }
     }
 
-    /// Smooth sides as a point [m] inside sees them: distance, negative inside, and its gradient. Each goes
-    /// on beyond the corners of the shape, so the nearest side is as far as the surface. Sampled distances
+    /// Smooth sides for a point [m] inside: distance, negative inside, and its gradient. Each side extends
+    /// beyond the corners of the shape, so that the nearest side is as far as the surface. Sampled distances
     /// have one side with a continuous gradient, shorter than 1 where it rounds corners.
     pub fn sides(&self, point: &Vector3<f64>) -> Sides {
         let side = |distance, normal| Some(Near { distance, normal });
@@ -185,13 +185,13 @@ impl Shape {
     }
 }
 
-/// Largest distance that a drawn corner moves where the surface grows by 1: the tip of a sharp cone has no
-/// bound of its own.
+/// Largest distance that a drawn corner moves where the surface grows by 1. Without this limit the tip of a
+/// sharp cone could move any distance.
 const FARTHEST: f64 = 3.0;
 
 impl Shape {
-    /// Where points [m] of its drawn surface go as it grows, per distance: sides go straight outward by that,
-    /// so edges stay sharp in pictures.
+    /// Motion of the points [m] of the drawn surface per growth distance. Sides move straight outward by that
+    /// distance, so that edges stay sharp in pictures.
     pub fn outward(&self, (points, triangles): &Triangles) -> Vec<Vector3<f64>> {
         if matches!(self, Self::Sphere { .. } | Self::Capsule { .. }) {
             return points.iter().map(|point| self.near(point).normal).collect();
@@ -249,7 +249,8 @@ fn around(from: Vector3<f64>, radius: f64) -> Near {
     Near { distance: distance - radius, normal }
 }
 
-/// In the half-plane of the distance from the axis and the height, a rectangle of this width and half height.
+/// Distance from a cylinder: from a rectangle of this width and half height, in the half-plane of the
+/// distance from the axis and the height.
 fn cylinder(point: &Vector3<f64>, radius: f64, half: f64) -> Near {
     let from_axis = Vector2::new(point.x, point.y);
     let q = from_axis.norm();
@@ -280,8 +281,8 @@ fn cuboid(point: &Vector3<f64>, half: &Vector3<f64>) -> Near {
     Near { distance: beyond[axis], normal }
 }
 
-/// In the half-plane of the distance from the axis and the height, the nearest point of the base or of the
-/// slope.
+/// Distance from a cone: from the nearest point of the base or of the slope, in the half-plane of the
+/// distance from the axis and the height.
 fn cone(point: &Vector3<f64>, radius: f64, height: f64) -> Near {
     let from_axis = Vector2::new(point.x, point.y);
     let q = Vector2::new(from_axis.norm(), point.z);

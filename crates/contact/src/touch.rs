@@ -1,9 +1,9 @@
 //! The least correction of a node that would go into a rigid surface: along the normal to the surface, then
-//! against sliding by the cone of friction. With the predicted place x*, the mobility w = ∂x/∂f of each
-//! component and the gap g = d(x*) − offset < 0, λ = −g / Σ w n², x* += w n λ; the slip d over the step, less
-//! that of the surface, is taken back by a force of at most μ λ. The force on the node is the correction over
-//! its mobility: a step with this force is perfectly plastic along the normal, keeps momentum, and leaves the
-//! critical time step as it is.
+//! against sliding by the cone of friction. Let x* be the predicted place and w = ∂x/∂f the mobility of each
+//! component. The gap is g = d(x*) − offset < 0. Then λ = −g / Σ w n² and x* += w n λ. The slip d over the
+//! step, relative to the surface, is taken back by a force of at most μ λ. The force on the node is the
+//! correction over its mobility. A step with this force is perfectly plastic along the normal and keeps
+//! momentum. It leaves the critical time step as it is.
 
 use std::collections::BTreeMap;
 
@@ -20,12 +20,12 @@ use crate::shape::{Near, Shape, Sides};
 pub(crate) const MOST_PARTS: f64 = 512.0;
 /// Gap, over half of the thinnest part of a thing, at which a node has met it.
 pub(crate) const MEETS: f64 = 1e-3;
-/// Cosine of the angle between the directions away from a thing where a point meets it and where it would
-/// end, above which both are on one side.
+/// Cosine of the angle between two directions away from a thing: where a point meets it, and where the point
+/// would end. Above this cosine both are on one side.
 pub(crate) const ALIKE: f64 = 0.7;
 /// Part of a depth at the beginning of a step that may be left at its end. Sharp edges come between the
-/// points of a face, and the way out of a thing can turn to another side of it: points that come to lie in it
-/// so are pushed out over several steps, as one would throw them.
+/// points of a face, and the way out of a thing can turn to another side. Points that come to lie in a thing
+/// like this are pushed out over several steps, since one step would throw them.
 pub const LEFT: f64 = 0.8;
 /// Passes over all rows of a step at most.
 pub const PASSES: usize = 30;
@@ -47,8 +47,8 @@ pub const LIFTS: usize = 16;
 pub const LIFTED: f64 = 1e-4;
 /// Gaps, over the depth of the deepest point, up to which points take part.
 pub const BAND: f64 = 8.0;
-/// Part of the longest edge of a surface that a node may be away from a thing and still count as near, in
-/// addition to its way in the step.
+/// Distance from a thing within which a node counts as near, over the longest edge of its surface. The way of
+/// the node in the step is added.
 pub const MARGIN: f64 = 0.1;
 
 /// A rigid thing: an obstacle, a tool or a jaw of one.
@@ -58,11 +58,11 @@ pub struct Rigid {
     pub name: String,
     /// Its shape.
     pub shape: Shape,
-    /// How it moves; of a jaw, how the tool does.
+    /// Motion of the thing; for a jaw, the motion of its tool.
     pub trajectory: Trajectory,
-    /// Whether bodies are inside of it, as a brain in its skull.
+    /// True if bodies are inside the thing, as a brain in its skull.
     pub inside: bool,
-    /// How it turns in the frame of the tool that it is a jaw of.
+    /// Rotation of a jaw in the frame of its tool.
     pub jaw: Option<Jaw>,
 }
 
@@ -71,11 +71,11 @@ pub struct Rigid {
 pub struct Jaw {
     /// The name of the tool.
     pub tool: String,
-    /// Which part of the angle between the jaws it turns by: one half, or minus one half.
+    /// Part of the angle between the jaws by which it turns: one half, or minus one half.
     pub part: f64,
     /// The angle [rad] between the jaws over time.
     pub opening: (f64, Curve),
-    /// Where its shape is in a closed tool.
+    /// Pose of its shape in a closed tool.
     pub place: Pose,
     /// The angle [rad] between the jaws from which on down they hold all that touches their inner faces;
     /// `None`: they hold by friction.
@@ -89,7 +89,7 @@ pub struct Gripped {
     pub rigid: u32,
     /// The node, numbered in the model.
     pub node: u32,
-    /// Where it is in the frame of the jaw's shape [m].
+    /// Place of the node in the frame of the jaw's shape [m].
     pub at: [f64; 3],
 }
 
@@ -99,8 +99,8 @@ impl Rigid {
         self.jaw.as_ref().map_or(&self.name, |jaw| &jaw.tool)
     }
 
-    /// The pose of the tool or obstacle at a time [s], and the angle [rad] between its jaws; driven as far as
-    /// there is a leg.
+    /// Returns the pose of the tool or obstacle at a time [s], and the angle [rad] between its jaws. A leg,
+    /// where it has a way, replaces the trajectory.
     pub fn posture(&self, time: f64, leg: Option<&Leg>) -> (Pose, f64) {
         let opening = |jaw: &Jaw| jaw.opening.0 * jaw.opening.1.value(time);
         let pose = leg.and_then(|leg| leg.pose(time)).unwrap_or_else(|| self.trajectory.at(time));
@@ -136,8 +136,8 @@ impl Rigid {
         Near { distance: sign * (distance - growth), normal: normal * sign }
     }
 
-    /// Distance of a point [m] from where it is free of the thing, and its gradient: of a hollow thing for
-    /// each of [`Shape::sides`], else for the nearest part of the surface.
+    /// Distance of a point [m] from where it is free of the thing, and its gradient. A hollow thing has one
+    /// for each of [`Shape::sides`], any other thing one for the nearest part of the surface.
     pub fn sides(&self, stance: &Stance, point: &Vector3<f64>) -> Sides {
         if !self.inside {
             let mut all = Sides::default();
@@ -165,7 +165,7 @@ impl Rigid {
         if self.inside { -1.0 } else { 1.0 }
     }
 
-    /// Whether its jaws hold all that touches them at an angle [rad] between them.
+    /// True if its jaws hold all that touches them at an angle [rad] between them.
     pub fn grips(&self, opening: f64) -> bool {
         self.jaw.as_ref().and_then(|jaw| jaw.grip).is_some_and(|closed| opening <= closed)
     }
@@ -192,7 +192,7 @@ fn travel(rigid: &Rigid, [before, after]: &[Stance; 2]) -> f64 {
     (to.translation.vector - from.translation.vector).norm() + turned + (after.growth - before.growth).abs()
 }
 
-/// How bodies touch rigid things.
+/// Friction and distance of a contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Touch {
     /// Coulomb's coefficient μ.
@@ -202,8 +202,9 @@ pub struct Touch {
 }
 
 impl Touch {
-    /// Where a node goes in the step between two times [s] that is predicted to go from `now` to `predicted`
-    /// [m]; `None` where it is free. `mobility` [m/N] is that of each component, zero of those that are held.
+    /// Returns the corrected place [m] of a node that is predicted to go from `now` to `predicted` [m] in the
+    /// step between two times [s]. `None` where the node is free. `mobility` [m/N] has a value for each
+    /// component, zero for held ones.
     pub fn correct(
         &self,
         rigid: &Rigid,
@@ -261,18 +262,18 @@ pub struct Passage {
     pub(crate) poses: [Pose; 2],
     /// Its growth [m] before and after.
     growth: [f64; 2],
-    /// How its frame is turned after.
+    /// Rotation of its frame after the step.
     pub(crate) turn: Matrix3<f64>,
     /// The motion from the pose before to that after.
     pub(crate) motion: Pose,
-    /// The largest way [m] of a point of it.
+    /// The largest way [m] of a point of the thing.
     pub(crate) travel: f64,
     /// Half of its thinnest part [m].
     half_thinnest: f64,
 }
 
 impl Passage {
-    /// In the step from one stance to another.
+    /// Makes the passage in the step from one stance to another.
     pub fn new(rigid: &Rigid, stances: [Stance; 2]) -> Self {
         let (poses, growth) = (stances.map(|own| own.pose), stances.map(|own| own.growth));
         let [before, after] = poses;
@@ -282,36 +283,37 @@ impl Passage {
         Self { poses, growth, turn, motion: after * before.inverse(), travel, half_thinnest }
     }
 
-    /// How far a point [m] is from the thing at the end of the step, and the direction away from it.
+    /// Returns the distance of a point [m] from the thing at the end of the step, and the direction away from
+    /// the thing.
     pub fn near(&self, rigid: &Rigid, point: &Vector3<f64>) -> Near {
         let (_, Near { distance, normal }) = self.within(rigid, point);
         Near { distance, normal: self.turn * normal }
     }
 
-    /// How far a point [m] is from the thing at the beginning of the step.
+    /// Returns the distance [m] of a point [m] from the thing at the beginning of the step.
     pub fn distance_before(&self, rigid: &Rigid, point: &Vector3<f64>) -> f64 {
         rigid.near(&self.before(), point).distance
     }
 
-    /// Where a point [m] at the end of the step is in the frame of the thing, and the direction away from it
-    /// there.
+    /// Returns a point [m] at the end of the step in the frame of the thing, and the distance and direction
+    /// away from the thing there.
     pub fn within(&self, rigid: &Rigid, point: &Vector3<f64>) -> (Vector3<f64>, Near) {
         let local = self.turn.tr_mul(&(point - self.poses[1].translation.vector));
         (local, rigid.near_local(self.growth[1], &local))
     }
 
-    /// Where a point [m] in the frame of the thing is at the end of the step.
+    /// Returns the place at the end of the step of a point [m] in the frame of the thing.
     pub fn place(&self, local: &Vector3<f64>) -> Vector3<f64> {
         (self.poses[1] * Point3::from(*local)).coords
     }
 
-    /// [`near`](Self::near) of a point that is predicted to go from one place [m] to another, and keeps an
-    /// offset [m]. If it ends in the thing, could pass through it or be passed over, it is followed on its
-    /// way: by its gap, which it can go without reaching the thing, and by half of the thinnest part next to
-    /// that. Where they meet, the tangent plane goes along with the thing; the distance is that from the
-    /// plane, if the point ends behind it on another side or has come far. So nothing comes to another side,
-    /// however thin the thing is, however far both go and however deep forces carry the prediction. Of a
-    /// depth at the beginning, [`LEFT`] may be left.
+    /// Runs [`near`](Self::near) for a point that is predicted to go from one place [m] to another, and keeps
+    /// an offset [m]. The point is followed on its way if it ends in the thing, could pass through it or be
+    /// passed over. Each part of the way is its gap, which it can go without reaching the thing. Next to the
+    /// thing, the part is half of the thinnest part. Where they meet, the tangent plane moves along with the
+    /// thing. If the point ends behind the plane on another side, or has come far, its distance is measured
+    /// from the plane. So no point comes to another side, however thin the thing is, however far both go and
+    /// however deep forces carry the prediction. Of a depth at the beginning, [`LEFT`] may be left.
     pub fn meet(&self, rigid: &Rigid, offset: f64, now: &Vector3<f64>, predicted: &Vector3<f64>) -> Near {
         let way = (predicted - now).norm() + self.travel;
         let end = self.near(rigid, predicted);
@@ -344,7 +346,7 @@ impl Passage {
         end
     }
 
-    /// Where a point [m] of the thing before the step is after it.
+    /// Returns the place after the step of a point [m] that moves with the thing from before the step.
     pub fn carry(&self, point: &Vector3<f64>) -> Vector3<f64> {
         (self.motion * Point3::from(*point)).coords
     }
@@ -354,8 +356,8 @@ impl Passage {
         self.travel
     }
 
-    /// The largest way [m] of a point of the thing from a stance to that at the end of the step; infinite of
-    /// a half-space that turns.
+    /// The largest way [m] of a point of the thing from a stance to the end of the step; infinite for a
+    /// half-space that turns.
     pub fn travel_from(&self, rigid: &Rigid, stance: &Stance) -> f64 {
         let after = self.stance();
         let is_endless = matches!(rigid.shape, Shape::HalfSpace);
@@ -366,23 +368,23 @@ impl Passage {
         }
     }
 
-    /// Where and how large it is at the end of the step.
+    /// Returns its pose and growth at the end of the step.
     pub fn stance(&self) -> Stance {
         Stance { pose: self.poses[1], growth: self.growth[1] }
     }
 
-    /// The same at its beginning.
+    /// Returns its pose and growth at the beginning of the step.
     fn before(&self) -> Stance {
         Stance { pose: self.poses[0], growth: self.growth[0] }
     }
 
-    /// The same after a fraction of its time.
+    /// Returns its pose and growth after a fraction of the step.
     fn at(&self, time_fraction: f64) -> Stance {
         Stance::between([&self.before(), &self.stance()], time_fraction)
     }
 }
 
-/// Who touches whom.
+/// A contact of a surface with its partner.
 #[derive(Clone, Debug)]
 pub struct Contact {
     /// Its name.
@@ -390,22 +392,22 @@ pub struct Contact {
     /// The surface of a body, nodes numbered in the model and increasing. Points on its triangles touch, too:
     /// close enough together for a rigid thing.
     pub surface: Surface,
-    /// What it touches.
+    /// Partner of the contact.
     pub with: With,
-    /// How.
+    /// Friction and distance to keep.
     pub touch: Touch,
 }
 
 impl Contact {
-    /// The surfaces that take part: its own, and that of another body.
+    /// Surfaces that take part: the contact's surface, and the surface of another body.
     pub fn surfaces(&self) -> impl Iterator<Item = &Surface> {
         let other = if let With::Body(other) = &self.with { Some(other) } else { None };
         std::iter::once(&self.surface).chain(other)
     }
 
-    /// Its pairs if it is one of bodies, with numbers of nodes that keep their order, and places at rest [m]
-    /// by these. Bodies are in the order of their nodes, with −1 where the contact names them in the other
-    /// one: results don't depend on that.
+    /// Returns its pairs if both partners are deformable, with renumbered nodes that keep their order.
+    /// `place` gives rest places [m] by the new numbers. Bodies are in the order of their nodes; the sign is
+    /// −1 where the contact names them the other way round. Results do not depend on that.
     pub fn pairs(
         &self,
         number: impl Fn(u32) -> u32,
@@ -439,7 +441,7 @@ impl Contacts {
         Some((pairs.keeping(near, place), sign))
     }
 
-    /// All nodes that may touch something, increasing.
+    /// Returns all nodes that may touch something, increasing.
     pub fn nodes(&self) -> Vec<u32> {
         let surfaces = self.contacts.iter().flat_map(Contact::surfaces);
         let mut nodes: Vec<u32> = surfaces.flat_map(|surface| &surface.nodes).copied().collect();
@@ -449,7 +451,7 @@ impl Contacts {
     }
 }
 
-/// What the surface of a body touches.
+/// Partner of the surface of a body in a contact.
 #[derive(Clone, Debug)]
 pub enum With {
     /// A rigid thing, by its place in [`Contacts::rigids`].
@@ -465,17 +467,17 @@ pub enum With {
 pub struct Contacts {
     /// Obstacles and tools.
     pub rigids: Vec<Rigid>,
-    /// Who touches whom.
+    /// Contacts of surfaces with their partners.
     pub contacts: Vec<Contact>,
     /// Rest places [m] of nodes that another solver moves: in surfaces they are numbered after the nodes of
     /// the model.
     pub coupled_nodes: Vec<Vector<f64>>,
-    /// Of contacts of bodies, by their place, the nodes that keep a smaller distance [m] than their [`Touch`]
-    /// says, since they are nearer at the start.
+    /// Nodes that keep a smaller distance [m] than their [`Touch`] says, by the index of a contact of bodies.
+    /// They are nearer at the start.
     pub near: BTreeMap<usize, Vec<(u32, f64)>>,
 }
 
-/// Points on a triangle besides its corners, by their weights: a lattice of so many parts of an edge.
+/// Points on a triangle besides its corners, by their weights: a lattice with `parts` parts of an edge.
 pub fn lattice(parts: usize) -> Vec<[f64; 3]> {
     let all = (0..=parts).flat_map(|i| (0..=parts - i).map(move |j| [i, j, parts - i - j]));
     let inner = all.filter(|point| !point.contains(&parts));
@@ -531,7 +533,7 @@ mod tests {
         assert!(touch.correct(&carried, [0.0, 1.0], now, then, [0.0; 3]).is_none());
     }
 
-    /// A particle at rest on a slope of ½ that steps by 1 ms: with μ = ½ it stays, with less it slides by ½ g
+    /// A particle at rest on a slope of ½ that steps by 1 ms. With μ = ½ it stays; with less it slides by ½ g
     /// (sin − μ cos) t² (A4).
     #[test]
     fn a_particle_on_an_incline_sticks_exactly_or_slides_by_coulombs_law() {

@@ -17,7 +17,7 @@ struct Passage {
     shift: vec3f,
     turn: mat3x3f,
     angle: vec3f,
-    // The largest way [m] of a point of it.
+    // The largest way [m] of a point of the thing.
     travel: f32,
 }
 
@@ -29,7 +29,7 @@ fn passage_matrix(at: u32) -> mat3x3f {
     return mat3x3f(passage_vector(at), passage_vector(at + 3u), passage_vector(at + 6u));
 }
 
-// That of a thing, from where the numbers of both begin.
+// Returns the passage of a thing, from the begins of the numbers of both.
 fn passage_of(thing: u32, at: u32) -> Passage {
     return Passage(
         thing, thing_number(thing + 2u), passage_vector(at), passage_vector(at + 3u), passage_matrix(at + 6u),
@@ -45,14 +45,15 @@ fn near_local(thing: u32, point: vec3f) -> Near {
     return Near(sign * near.distance, sign * near.normal);
 }
 
-// How far a point is from the thing at the end of the step, and the direction away from it; from its place
-// less that of the thing then.
+// Returns the distance of a point from the thing at the end of the step, and the direction away from the
+// thing. `place` is relative to the thing's position then.
 fn near_after(passage: Passage, place: vec3f) -> Near {
     let near = near_local(passage.thing, place * passage.turned_after);
     return Near(near.distance, passage.turned_after * near.normal);
 }
 
-// How far a point is from the thing at the beginning of the step; from its place less that of the thing then.
+// Returns the distance of a point from the thing at the beginning of the step. `place` is relative to the
+// thing's position then.
 fn distance_before(passage: Passage, place: vec3f) -> f32 {
     return near_local(passage.thing, place * passage.turned_before).distance;
 }
@@ -69,8 +70,8 @@ fn rotated(by: vec3f, v: vec3f) -> vec3f {
     return v + sine(angle) * across + 2.0 * half * half * cross(axis, across);
 }
 
-// The distance of a point that is predicted to go by `moved`, and the direction away from the thing; from its
-// place less that of the thing before. It is followed as `Passage::meet` does.
+// Returns the distance of a point that is predicted to go by `moved`, and the direction away from the thing.
+// `place` is relative to the thing's position before the step. The point is followed as in `Passage::meet`.
 fn meet(passage: Passage, offset: f32, place: vec3f, moved: vec3f) -> Near {
     let relative = moved - passage.shift;
     let way = norm(moved) + passage.travel;
@@ -101,7 +102,7 @@ fn meet(passage: Passage, offset: f32, place: vec3f, moved: vec3f) -> Near {
     return end;
 }
 
-// The way [m] of a point of the thing that is at a place, less that of the thing, before the step.
+// Returns the way [m] of a point of the thing. `place` is relative to the thing's position before the step.
 fn carried(passage: Passage, place: vec3f) -> vec3f {
     return passage.shift + passage.turn * place;
 }

@@ -1,6 +1,6 @@
-//! Boxes around moving things in a tree: found anew from the leaves up when the things have moved
-//! ([`Tree::refit`]), sorted anew when the boxes have grown into each other. A flat array with children after
-//! their parent, so that a sweep from its end is a refit.
+//! A tree of boxes around moving things. Boxes are computed anew from the leaves up when the things have
+//! moved ([`Tree::refit`]). The tree is sorted anew when the boxes have grown into each other. The tree is a
+//! flat array with children after their parent, so that a sweep from its end is a refit.
 
 use nalgebra::Vector3;
 
@@ -27,7 +27,7 @@ impl Bounds {
         Self { low: self.low.add_scalar(-margin), high: self.high.add_scalar(margin) }
     }
 
-    /// Whether two boxes share a point.
+    /// True if two boxes share a point.
     #[inline]
     pub fn touches(&self, other: &Self) -> bool {
         (0..3).all(|c| self.low[c] <= other.high[c] && other.low[c] <= self.high[c])
@@ -55,8 +55,8 @@ impl Bounds {
     }
 }
 
-/// The lesser of each component. Places are finite: what `f64::min` does beside that for what is no number
-/// takes a sixth of a refit.
+/// The lesser of each component. Places are finite: the handling of NaN in `f64::min` would take a sixth of a
+/// refit.
 #[inline]
 fn lower(a: &Vector3<f64>, b: &Vector3<f64>) -> Vector3<f64> {
     a.zip_map(b, |a, b| if a < b { a } else { b })
@@ -70,7 +70,7 @@ fn higher(a: &Vector3<f64>, b: &Vector3<f64>) -> Vector3<f64> {
 
 /// Things at most in a part that is not halved.
 const FEW: usize = 4;
-/// Surface of all boxes, over that of a newly sorted tree, at which the tree is sorted anew.
+/// Surface of all boxes at which the tree is sorted anew, over the surface in a newly sorted tree.
 const WORN: f64 = 1.5;
 
 #[derive(Clone, Debug)]
@@ -179,8 +179,8 @@ mod tests {
     use super::*;
     use pliant_testing::Random;
 
-    /// The same things as by trying all, after any motion; the order of things does not depend on how often
-    /// the tree was sorted.
+    /// The tree finds the same things as a test of all, after any motion. The order of things does not depend
+    /// on how often the tree was sorted.
     #[test]
     fn what_is_near_is_what_brute_force_finds() {
         let mut random = Random::new(5);

@@ -28,7 +28,7 @@ fn a_plane_is_exact() {
     }
 }
 
-/// A curved surface is off by less than h²/(2 r), and the gradient is that of the distance that is found.
+/// A curved surface is off by less than h²/(2 r), and the gradient belongs to the distance that is found.
 #[test]
 fn the_gradient_is_that_of_the_distance() {
     const RADIUS: f64 = 0.06;
@@ -54,8 +54,8 @@ fn the_gradient_is_that_of_the_distance() {
     }
 }
 
-/// In the corner of a box the gradient turns evenly, where that of linear interpolation jumps from cell to
-/// cell.
+/// In the corner of a box the gradient turns evenly, but the gradient of linear interpolation jumps from cell
+/// to cell.
 #[test]
 fn gradients_go_on_evenly_through_cells_and_corners() {
     let grid = sampled(|x| x.amax() - 0.055);

@@ -34,7 +34,7 @@ pub(crate) struct AppliedForces<R> {
     grips: Vec<Grip>,
     /// Forces [N] from outside that stay, one a node; empty for none.
     given: Vec<Vector<f64>>,
-    /// Whether more than gravity acts: other loads, grips or given forces.
+    /// True if more than gravity acts: other loads, grips or given forces.
     loaded: bool,
     /// The blocks of nodes that forces were added to at this instant, and a mark of each block.
     added: Vec<u32>,
@@ -69,14 +69,14 @@ impl<R: LaneNumber> AppliedForces<R> {
         own
     }
 
-    /// Takes other grips.
+    /// Replaces the grips.
     pub(crate) fn grip(&mut self, grips: &[Grip]) {
         self.grips.clear();
         self.grips.extend_from_slice(grips);
         self.see_whether_loaded();
     }
 
-    /// Takes other forces [N] from outside that stay, one a node, or none.
+    /// Replaces the lasting forces [N] from outside, one per node, or none.
     pub(crate) fn push(&mut self, forces: &[Vector<f64>]) {
         self.given.clear();
         self.given.extend_from_slice(forces);
@@ -103,7 +103,7 @@ impl<R: LaneNumber> AppliedForces<R> {
         true
     }
 
-    /// Adds a force [N] on a node to those of the instant.
+    /// Adds a force [N] on a node to the forces of the instant.
     pub(crate) fn add(&mut self, node: u32, force: Vector<f64>) {
         self.nodal[node as usize] = add(self.nodal[node as usize], force);
         let block = node as usize / BLOCK;

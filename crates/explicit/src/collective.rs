@@ -1,16 +1,16 @@
-//! Constraints that bind nodes to each other: a mean displacement that is prescribed, rigid parts of a body,
-//! an enclosed volume. A step predicts where the nodes go without them and corrects it by the least change in
-//! the metric of the masses, so that momentum and angular momentum are kept, and no wave becomes faster: the
-//! critical time step stays. The corrections enter the step as forces, hence the energies too.
+//! Constraints that bind nodes to each other: a prescribed mean displacement, rigid parts of a body, an
+//! enclosed volume. A step predicts where the nodes go without the constraint, and corrects the prediction by
+//! the least change in the metric of the masses. So momentum and angular momentum are kept. No wave becomes
+//! faster: the critical time step stays. The corrections enter the step as forces, hence the energies too.
 //!
 //! *Mean.* Σ wᵢ uᵢ = d with forces wᵢ λ: λ = (d − Σ wᵢ uᵢ*)/Σ wᵢ² yᵢ, uᵢ* the prediction and yᵢ = Δt²/m the
 //! mobility of a node.
 //!
-//! *Rigid.* x = c + R (X − X̄), c and X̄ centres of mass, such that the forces have no moment where the nodes
-//! are now, about their centre: Σ mᵢ rᵢ × (R (Xᵢ − X̄) − rᵢ*) = 0 with arms rᵢ now and rᵢ* predicted. This is
-//! the discrete rigid body of Moser and Veselov (1991), which keeps Σ m xⁿ × xⁿ⁺¹ exactly. Newton's method
-//! finds R, from the rotation of the polar decomposition of Σ mᵢ rᵢ* ⊗ (Xᵢ − X̄) (Kabsch 1976) on; nodes on a
-//! line keep that one.
+//! *Rigid.* x = c + R (X − X̄), with c and X̄ the centres of mass. The forces have no moment about the centre
+//! where the nodes are now: Σ mᵢ rᵢ × (R (Xᵢ − X̄) − rᵢ*) = 0 with arms rᵢ now and rᵢ* predicted. This is the
+//! discrete rigid body of Moser and Veselov (1991), which keeps Σ m xⁿ × xⁿ⁺¹ exactly. Newton's method finds
+//! R. It starts from the rotation of the polar decomposition of Σ mᵢ rᵢ* ⊗ (Xᵢ − X̄) (Kabsch 1976), which
+//! nodes on a line keep.
 //!
 //! *Volume.* V(x* + y g p) = V₀ + ΔV with forces p gᵢ, gᵢ = ∂V/∂xᵢ where the nodes are now; V is of third
 //! order in p, which Newton's method finds. The forces of a pressure on a closed surface have no resultant
@@ -30,14 +30,14 @@ const MOST_PRESSURES: usize = 20;
 /// A part of a volume that counts as none.
 const FILLED: f64 = 1e-14;
 
-/// Where a node goes without a constraint.
+/// Motion of a node in a step without a constraint.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Predicted {
-    /// Its displacement [m] now.
+    /// Displacement [m] of the node now.
     pub now: Vector<f64>,
-    /// Its displacement [m] after the step.
+    /// Displacement [m] of the node after the step.
     pub displacement: Vector<f64>,
-    /// By how much a force moves it over the step [m/N].
+    /// Mobility: way per force over the step [m/N].
     pub mobility: f64,
     /// The components that another constraint prescribes; forces do not move them.
     pub held: [bool; 3],
@@ -51,7 +51,7 @@ pub(crate) struct Collective {
     pub force: Vector<f64>,
     /// The volume and its pressure at the last evaluation; zero of other constraints.
     pub enclosed: Enclosed,
-    /// Of each node.
+    /// Force [N] on each node.
     own: Vec<Vector<f64>>,
     predicted: Vec<Predicted>,
     /// Volume [m³] at rest, the gradient [m²] now and that after the step.
@@ -60,7 +60,7 @@ pub(crate) struct Collective {
 }
 
 impl Collective {
-    /// Those of a model.
+    /// Builds the collective constraints of a model.
     pub fn all(model: &Model) -> Vec<Self> {
         let collective = model.constraints.iter().enumerate().filter(|(_, own)| own.motion.is_collective());
         let new = |(constraint, own): (usize, &Constraint)| {
@@ -83,8 +83,8 @@ impl Collective {
         collective.map(new).collect()
     }
 
-    /// Finds the forces; `factor` is that of a mean's displacement or of a volume's growth after the step. A
-    /// pressure is added to the one there is.
+    /// Finds the forces; `factor` scales a mean's displacement or a volume's growth after the step. The
+    /// pressure found is added to the present one.
     pub fn find(&mut self, model: &Model, predicted: impl Fn(u32) -> Predicted, factor: f64) {
         let constraint = &model.constraints[self.constraint];
         self.predicted.clear();
@@ -144,9 +144,9 @@ impl Collective {
         self.enclosed.pressure += pressure;
     }
 
-    /// Makes forces [N] that were found step by step, one a node of the model, those of the constraint where
-    /// the nodes are displaced by so much [m] now: of a volume those of its pressure, of a rigid part without
-    /// resultant and moment. Those of a mean stay.
+    /// Turns forces [N] found step by step into the forces of the constraint at these displacements [m].
+    /// `forces` has one entry per node of the model. An enclosed volume gets the forces of its pressure, a
+    /// rigid part forces without resultant and moment. A mean keeps its forces.
     pub fn renew<R: LaneNumber>(
         &mut self,
         model: &Model,
@@ -335,7 +335,7 @@ mod tests {
         assert!(stepper.energies().balance.abs() < 1e-2, "{:?}", stepper.energies());
     }
 
-    /// The mean goes where it is sent, single nodes do not; the work of its force is that of the balance.
+    /// The mean follows its curve while single nodes do not, and the work of its force balances the energies.
     #[test]
     fn a_mean_goes_by_as_much_as_it_is_told() {
         let curve = Curve { shape: Shape::SmoothStep, from: 0.0, to: 0.1 };

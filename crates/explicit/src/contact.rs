@@ -1,8 +1,8 @@
-//! Contacts in a step: nodes are predicted, and impulses found that keep them and points between them apart
-//! from rigid things, other bodies and other parts of their own. A point pair x = Σ cᵢ xᵢ with normal n and
-//! gap g is a row: impulses cᵢ λ n on its nodes with λ ≥ 0, g ≥ 0 and λ g = 0, and against its slip by at
-//! most μ λ. Projected Gauss–Seidel finds them, in the order of the rows: momentum is kept to the last bit of
-//! each impulse. A last pass over nodes alone keeps these out of curved rigid things, too.
+//! Contacts in a step. Nodes are predicted, then impulses keep them, and points between them, apart from
+//! rigid things, other bodies and other parts of their own body. A point pair x = Σ cᵢ xᵢ with normal n and
+//! gap g is a row. Its nodes get impulses cᵢ λ n with λ ≥ 0, g ≥ 0 and λ g = 0. Friction adds impulses of at
+//! most μ λ against the slip. Projected Gauss–Seidel finds them, in the order of the rows: momentum is kept
+//! to the last bit of each impulse. A last pass over nodes alone keeps these out of curved rigid things, too.
 
 mod at_rigid;
 mod coupled_surfaces;
@@ -36,19 +36,19 @@ const TOUCHING: f64 = 1e-6;
 /// Cosine of the angle to the normal of a jaw's inner face up to which nodes are between the jaws.
 const INWARD: f64 = 0.7;
 
-/// How a rigid thing is in a step.
+/// Placement of a rigid thing in a step.
 pub(crate) struct Posture {
-    /// Where and how large it is before and after.
+    /// Poses and sizes before and after the step.
     pub stances: [Stance; 2],
     /// The angle [rad] between its jaws after.
     pub opening: f64,
 }
 
-/// Where a node goes without contact.
+/// Motion of a node in a step without contact.
 pub(crate) struct Free {
-    /// Its place [m] after the step.
+    /// Place [m] of the node after the step.
     pub then: Vector<f64>,
-    /// By how much a force moves each component over the step [m/N]; zero of those that are prescribed.
+    /// Mobility: way of each component per force over the step [m/N]; zero for prescribed components.
     pub mobility: Vector<f64>,
 }
 
@@ -57,9 +57,9 @@ pub(crate) struct Free {
 struct Node {
     free: Vector3<f64>,
     then: Vector3<f64>,
-    /// By how much contacts can move each component; zero also of nodes that jaws hold.
+    /// Mobility [m/N] under contacts; zero for prescribed components and for nodes that jaws hold.
     mobility: Vector3<f64>,
-    /// By how much a force does.
+    /// Mobility [m/N] under any force.
     own: Vector3<f64>,
     /// Impulses [N] of rows on it, of a node that jaws hold.
     borne: Vector3<f64>,
@@ -67,13 +67,13 @@ struct Node {
     lifted: Vector3<f64>,
     /// Length [m] of its way by impulses at most.
     way: f64,
-    /// Whether it may touch something, so that its prediction is known.
+    /// True if the node may touch something, so that its prediction is known.
     near: bool,
-    /// Whether it is in a pair of bodies.
+    /// True if the node is in a pair of bodies.
     paired: bool,
     /// The first of the rows on it alone.
     first: u32,
-    /// Its depth [m] in things at the predicted place.
+    /// Depth [m] of the node in things at the predicted place.
     depth: f64,
 }
 
@@ -102,7 +102,7 @@ impl Node {
     }
 }
 
-/// What a contact is about, in numbers of nodes of [`ContactSolver`].
+/// The partner of a surface in a contact, with nodes numbered as in [`ContactSolver`].
 enum Own {
     Rigid(Box<AtRigid>),
     /// Bodies, with a sign ([`Contact::pairs`](pliant_contact::touch::Contact::pairs)).
@@ -112,10 +112,10 @@ enum Own {
 /// The contacts of a model, with the nodes that they are about.
 pub(crate) struct ContactSolver<R> {
     contacts: Arc<Contacts>,
-    /// Their numbers in the model, increasing; those of coupled nodes come after it.
+    /// Numbers of the nodes in the model, increasing; coupled nodes are numbered after the model's nodes.
     numbers: Vec<u32>,
     coupled_surfaces: CoupledSurfaces,
-    /// Where the nodes are at rest, and before the step [m]; the latter only of those that `placed` has.
+    /// Places [m] of the nodes at rest, and before the step; the latter only for nodes in `placed`.
     rest: Vec<Vector3<f64>>,
     places: Vec<Vector3<f64>>,
     /// Nodes that a list of a thing has, and those that may touch other bodies; increasing.
@@ -142,13 +142,13 @@ pub(crate) struct ContactSolver<R> {
     slid: Vec<(u32, f64)>,
     /// The force [N] of each contact on its first surface at the last evaluation.
     pub forces: Vec<Vector<f64>>,
-    /// The moment [N m] of that of each contact with a rigid thing about the origin, where points were before
-    /// the step.
+    /// Moment [N m] of the force of each contact with a rigid thing, about the origin, with points where they
+    /// were before the step.
     pub moments: Vec<Vector<f64>>,
 }
 
 impl<R: LaneNumber> ContactSolver<R> {
-    /// Those of a model with these nodes at rest [m].
+    /// Contacts of a model with these nodes at rest [m].
     pub fn new(contacts: Arc<Contacts>, rest: &[Vector<f64>]) -> Self {
         let numbers = contacts.nodes();
         let coupled_surfaces = CoupledSurfaces::new(rest.len(), &contacts.coupled_nodes);
@@ -274,7 +274,7 @@ impl<R: LaneNumber> ContactSolver<R> {
         touching.map(|(node, number)| (number, over(&(node.then - node.free), &node.own).into()))
     }
 
-    /// Says where coupled nodes go between two times [s]: from one place [m] to the other, at the same speed.
+    /// Leads the coupled nodes from one place [m] to another between two times [s], at constant speed.
     /// Impulses on them count from now on.
     pub fn lead(&mut self, times: [f64; 2], ways: &[[Vector<f64>; 2]]) {
         self.coupled_surfaces.lead(times, ways);
@@ -340,7 +340,8 @@ impl<R: LaneNumber> ContactSolver<R> {
         way
     }
 
-    /// Where nodes are before the step that may touch something in it, and those that jaws hold.
+    /// Finds the places before the step of the nodes that may touch something in the step, and of nodes that
+    /// jaws hold.
     fn place(&mut self, now: &Nodes<'_, R>, gripped: &[Gripped]) {
         let held = gripped.iter().filter_map(|held| self.numbers.binary_search(&held.node).ok());
         let nodes = self.placed.iter().copied().chain(held.map(|node| node as u32));
@@ -396,7 +397,7 @@ impl<R: LaneNumber> ContactSolver<R> {
         })
     }
 
-    /// Takes nodes along that jaws hold.
+    /// Takes along the nodes that jaws hold.
     fn grip(&mut self, gripped: &[Gripped]) {
         for held in gripped {
             let Some((_, own, node)) = self.holder(held) else { continue };
@@ -477,9 +478,9 @@ impl<R: LaneNumber> ContactSolver<R> {
         rows.retain(|row| row.gap < BAND * deepest);
     }
 
-    /// Impulses of all rows. The side of a thing is that where a node is predicted, which can be deep; where
-    /// the node comes to lie off this side, the side beside it takes its place, and where it lies behind
-    /// another one, that is one more row.
+    /// Finds the impulses of all rows. A node meets a thing at the side where it is predicted, which can be
+    /// deep. If the node comes to lie off this side, the adjacent side replaces it. If the node lies behind
+    /// another side, that side becomes one more row.
     fn solve(&mut self) {
         let deepest = self.rows.iter().map(|row| -row.gap).fold(0.0, f64::max);
         if deepest <= 0.0 {

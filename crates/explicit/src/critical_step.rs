@@ -3,8 +3,8 @@
 //!
 //! *Element bound* (rigorous, Irons and Treharne): λ_max(K_e) ≤ V (λ+2μ) Σ|B_a|², hence Δt_e = 2/√(n (λ+2μ)/ρ
 //! Σ|B_a|²) and Δt_cr ≥ min Δt_e. *Assembled model*: 2/ω_max of the assembled, constrained operator M⁻¹K by
-//! the Lanczos method, the accelerated form of the power iteration: the same operator calls, far fewer of
-//! them. K v = (f(hv) − f(−hv))/2h. During a run, isotropic laws take (f(u + hv) − f(u))/h, half of the force
+//! the Lanczos method. It accelerates the power iteration: the same operator calls, but far fewer. K v =
+//! (f(hv) − f(−hv))/2h. During a run, isotropic laws take (f(u + hv) − f(u))/h, half of the force
 //! evaluations. A run in single precision takes forces in its own precision where they suffice.
 
 use std::borrow::Cow;
@@ -39,8 +39,8 @@ pub fn cell_bound(solid: &Solid, cell: usize) -> f64 {
     2.0 / (n * wave * solid.cells.gradient_square_sum(cell)).sqrt()
 }
 
-/// The least factor by which mass scaling makes a node of a cell heavier; one that follows others has no mass
-/// and counts as it is.
+/// Returns the least factor by which mass scaling makes a node of a cell heavier. A node that follows others
+/// has no mass and gets the factor 1.
 fn mass_factor(model: &Model, solid: &Solid, cell: usize) -> f64 {
     let Some(scaling) = &model.mass_scaling else { return 1.0 };
     let factor = |&node: &u32| {
@@ -90,7 +90,7 @@ pub struct CriticalStep {
 }
 
 const LARGEST_SUBSPACE: usize = 200;
-/// The same where only a rough value counts.
+/// Largest subspace if only a rough value counts.
 const DECIDED: usize = 50;
 const TOLERANCE: f64 = 1e-4;
 /// The relative residual that is small enough of an eigenvalue that leaves steps as they are.
@@ -114,7 +114,7 @@ pub fn assembled_at(model: &Model, displacement: &[Vector<f64>]) -> Result<Criti
     Ok(assembled_about(model, &model.constrained_components()?, displacement))
 }
 
-/// The same where the owner of each component is known.
+/// Computes the critical time step as [`assembled_at`] does, with the owner of each component known.
 pub(crate) fn assembled_about(
     model: &Model,
     owners: &[[u32; 3]],
@@ -131,13 +131,13 @@ pub(crate) fn assembled_about(
     CriticalStep { step, error, force_calls: operator.calls, seconds_per_call }
 }
 
-/// The critical time step [s] without damping about a deformed state of a run, where the owner of each
-/// component is known. Once three looks at Lanczos' iteration agree to [`ROUGH`] that it is at least `enough`
-/// [s], the iteration ends. What it then overlooks is less than `RESERVE`
-/// leaves: 2 % of the step at most in the tests below.
+/// Returns the critical time step [s] without damping about a deformed state of a run, with the owner of each
+/// component known. Once three looks at Lanczos' iteration agree to [`ROUGH`] that the step is at least
+/// `enough` [s], the iteration ends. Its remaining error is less than the reserve of `RESERVE`: 2 % of the
+/// step at most in the tests below.
 ///
-/// The `forces` of the run are used where they can be; afterwards they are those of the last evaluation
-/// again. In single precision a step that is not `enough` is found again in double precision.
+/// The `forces` of the run are used where possible; afterwards they are the forces of the last evaluation
+/// again. In single precision a step below `enough` is found again in double precision.
 pub(crate) fn limit_about<R: LaneNumber>(
     model: &Model,
     owners: &[[u32; 3]],
@@ -167,7 +167,7 @@ pub(crate) fn limit_about<R: LaneNumber>(
     })
 }
 
-/// The same by forces in double precision.
+/// Computes the limit of [`limit_about`] from forces in double precision.
 fn limit_or_enough<R: LaneNumber>(
     model: &Model,
     owners: &[[u32; 3]],
@@ -203,14 +203,14 @@ fn limit_if_enough<R: LaneNumber>(
     (limit >= enough).then_some(limit)
 }
 
-/// Whether differences of one side will do: there are no fibres, which have two slopes where they are slack,
-/// and no search across walls.
+/// True if one-sided differences suffice, as there are no fibres and no searches across walls. Fibres have
+/// two slopes where they are slack.
 fn is_smooth(model: &Model) -> bool {
     !has_search_across(model) && model.solids.iter().all(|solid| solid.material.law.is_isotropic())
 }
 
-/// Whether walls in plane stress are searched for their thickness, to a tolerance that small differences of a
-/// steep law show.
+/// True if the thickness of walls in plane stress is found by a search, whose tolerance shows in small
+/// differences of a steep law.
 fn has_search_across(model: &Model) -> bool {
     let is_searched =
         |solid: &Solid| matches!(solid.cells, Cells::Membrane(..)) && !solid.material.law.is_incompressible();
@@ -225,12 +225,12 @@ fn step_of(eigenvalue: f64) -> f64 {
 /// A difference has moves over its size, with their weights in the stiffness, and that size over the one of a
 /// cell. It is far from round-off and from the law's curvature.
 type Difference = (&'static [[f64; 2]], f64);
-/// This one takes the mean of two slopes.
+/// The central difference takes the mean of two slopes.
 const CENTRAL: Difference = (&[[1.0, 0.5], [-1.0, -0.5]], 1e-6);
-/// This one starts from the forces of the state itself.
+/// The forward difference starts from the forces of the state itself.
 const FORWARD: Difference = (&[[1.0, 1.0]], 1e-7);
-/// Both in single precision. A law that stiffens by e for each 1 % of strain is off by 1 % in the one of one
-/// side.
+/// Both differences in single precision. If a law stiffens by e for each 1 % of strain, the forward
+/// difference is off by 1 %.
 const CENTRAL_IN_SINGLE: Difference = (CENTRAL.0, 2e-3);
 const FORWARD_IN_SINGLE: Difference = (FORWARD.0, 2e-4);
 /// The most that rounding may take of a difference.
@@ -269,7 +269,7 @@ struct Operator<'a, R> {
     model: &'a Model,
     /// The displacements [m] about which the model vibrates, tied nodes where their ties put them.
     about: Vec<Vector<R>>,
-    /// With its largest displacement [m].
+    /// Difference, with its largest displacement [m].
     difference: Difference,
     forces: &'a mut InternalForces<R>,
     /// Forces [N] of the state, where a difference is taken from them.
@@ -345,14 +345,15 @@ impl<'a, R: LaneNumber> Operator<'a, R> {
     }
 }
 
-/// When the search for an eigenvalue ends.
+/// Criterion that ends the search for an eigenvalue.
 #[derive(Clone, Copy, PartialEq)]
 enum Until {
-    /// When it is right to [`TOLERANCE`].
+    /// The eigenvalue is accurate to [`TOLERANCE`].
     Accurate,
-    /// The same, or when the step [s] is at least this one, to [`ROUGH`].
+    /// The eigenvalue is accurate to [`TOLERANCE`], or to [`ROUGH`] if the step is at least this one [s].
     Enough(f64),
-    /// When it is, to [`ROUGH`]; in vain where it is not, or neither shows soon.
+    /// The step is at least this one [s], to [`ROUGH`]. The search fails if the step is shorter, or if
+    /// neither shows soon.
     Decided(f64),
 }
 
@@ -480,8 +481,8 @@ mod tests {
     use crate::forces::tests::{distorted_cube, laws};
     use crate::substeps::RESERVE;
 
-    /// Calls `check` with cubes of every element and of laws with and without fibres, also one that stiffens,
-    /// free and held, and with uneven displacements that press or shear them.
+    /// Calls `check` with cubes of every element and of laws with and without fibres, also one that stiffens.
+    /// The cubes are free or held, and uneven displacements press or shear them.
     fn of_deformed_cubes(mut check: impl FnMut(&str, &Model, &[Vector<f64>])) {
         let pressed = Tensor([[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, -0.3]]);
         let sheared = Tensor([[0.0, 0.4, 0.0], [0.0; 3], [0.0; 3]]);
@@ -508,9 +509,9 @@ mod tests {
         }
     }
 
-    /// Both eigenvalues are right to the tolerance, so the steps differ by half of it, and slopes on one side
-    /// add a little. A rough one is at most [`ROUGH`] too large, as its residual is counted in, and it
-    /// overlooks less than `RESERVE` leaves. Single precision adds 1e-3 at most.
+    /// Both eigenvalues are right to the tolerance, so the steps differ by half the tolerance, and slopes on
+    /// one side add a little. A rough eigenvalue is at most [`ROUGH`] too large, as its residual is counted
+    /// in. Its other error is less than the reserve of `RESERVE`. Single precision adds 1e-3 at most.
     #[test]
     fn the_limit_of_a_run_is_the_critical_time_step() {
         of_deformed_cubes(|name, model, displacement| {

@@ -1,9 +1,9 @@
 //! Largest eigenvalues of small symmetric matrices, without a branch, so that many are found side by side.
 //!
 //! *Nine rows*: Householder's reflections leave a tridiagonal matrix. Laguerre's iteration finds the largest
-//! root of its characteristic polynomial; from above, all roots being real, it falls to that root and never
-//! below (Wilkinson, *The Algebraic Eigenvalue Problem*, 1965, ch. 7). *Three rows*: Newton's method finds
-//! the cosine of a third of an angle, from above.
+//! root of its characteristic polynomial. All roots are real, so from above it falls to the largest root and
+//! never below (Wilkinson, *The Algebraic Eigenvalue Problem*, 1965, ch. 7). *Three rows*: Newton's method
+//! finds the cosine of a third of an angle, from above.
 
 use pliant_mechanics::Number;
 use pliant_mechanics::tensor::{Symmetric, Vector, add, cross, dot, scale};
@@ -11,8 +11,8 @@ use pliant_mechanics::tensor::{Symmetric, Vector, add, cross, dot, scale};
 /// Rows of the matrix of a cell: three directions of displacement by three of its gradient.
 pub(crate) const ROWS: usize = 9;
 
-/// Turns of Laguerre's iteration. Near a simple root each cubes the error; a root met six times out of nine,
-/// the worst, leaves half of it.
+/// Turns of Laguerre's iteration. Near a simple root each turn cubes the error. A root met six times out of
+/// nine, the worst case, leaves half of the error.
 const TURNS_OF_LAGUERRE: usize = 9;
 /// Turns of Newton's method, from at most 8 % above a cosine.
 const TURNS_OF_NEWTON: usize = 4;
@@ -70,7 +70,8 @@ fn logarithmic_derivatives<N: Number>(
     [slope, bend]
 }
 
-/// The diagonal, and the squares beside it, of a tridiagonal matrix with the same eigenvalues.
+/// Returns the diagonal, and the squares of the entries next to the diagonal, of a tridiagonal matrix with
+/// the same eigenvalues.
 #[inline(always)]
 fn tridiagonal<N: Number>(m: &mut [[N; ROWS]; ROWS]) -> ([N; ROWS], [N; ROWS - 1]) {
     let mut squares = [N::ZERO; ROWS - 1];
@@ -142,7 +143,8 @@ pub(crate) fn largest_of_three<N: Number>(tensor: &Symmetric<N>) -> N {
 #[inline(always)]
 pub(crate) fn eigenvector<N: Number>(tensor: &Symmetric<N>, eigenvalue: N, instead: Vector<N>) -> Vector<N> {
     let [a, b, c] = tensor.plus_scaled(&Symmetric::IDENTITY, -eigenvalue).full().0;
-    // Each is the eigenvector times a number; the sign of that is the first one's or that of those before.
+    // Each product is the eigenvector times a number. The sign of this number follows the first product, or
+    // the sum of the earlier ones.
     let mut sum = cross(a, b);
     for product in [cross(b, c), cross(c, a)] {
         let sign = N::ONE.copysign(dot(sum, product));
@@ -192,7 +194,8 @@ mod tests {
         }
     }
 
-    /// Six equal ones at the top are the worst case, above by what is left of the start.
+    /// Six equal eigenvalues at the top are the worst case: the result exceeds them by the rest of the error
+    /// at the start.
     #[test]
     fn one_met_several_times_is_found_from_above() {
         let mut random = random();

@@ -1,5 +1,5 @@
-//! The book of energies: what is summed over the nodes at an instant becomes work done so far, and is judged
-//! for balance.
+//! The book of energies: sums over the nodes at an instant become work done so far, and are judged for
+//! balance.
 
 use pliant_mechanics::Energies;
 use pliant_mechanics::model::Model;
@@ -13,12 +13,12 @@ pub fn balance_floor<R: LaneNumber>() -> f64 {
     (R::EPSILON * 10.0).max(1e-9)
 }
 
-/// A run whose energies are off by more than this fraction of the largest one ends …
+/// A run ends if its energies are off balance by more than this fraction of the largest one …
 pub const BALANCE_LIMIT: f64 = 0.05;
 
-/// … once they are so for this many steps in a row. A shock unbalances the few steps in which the struck
-/// nodes move but their stress wave is not yet resolved; a stable vibration with more than 5 % of its energy
-/// in the step error (ωΔt > 0.45) passes through zero every seventh step; only a growing one stays.
+/// … for this many steps in a row. A shock unbalances the few steps in which the struck nodes move but their
+/// stress wave is not yet resolved. A stable vibration with more than 5 % of its energy in the step error
+/// (ωΔt > 0.45) passes through zero every seventh step. Only a growing vibration stays off balance.
 pub const BALANCE_STEPS: u32 = 20;
 
 /// Sums over the nodes at one instant [J], [W].
@@ -30,11 +30,11 @@ pub struct Sums {
     pub damping_power: f64,
     /// ½ Σ f_int · Δu with the increments before this instant.
     pub internal_before: f64,
-    /// The same with the increments after it.
+    /// ½ Σ f_int · Δu with the increments after this instant.
     pub internal_after: f64,
     /// ½ Σ f · Δu of loads and reactions, with the increments before.
     pub external_before: f64,
-    /// The same with the increments after.
+    /// ½ Σ f · Δu of loads and reactions, with the increments after.
     pub external_after: f64,
 }
 
@@ -50,7 +50,7 @@ impl Sums {
         }
     }
 
-    /// Whether every number is one.
+    /// True if the kinetic energy and the sums after the instant are finite.
     pub fn is_finite(&self) -> bool {
         self.kinetic.is_finite() && self.internal_after.is_finite() && self.external_after.is_finite()
     }
@@ -73,9 +73,8 @@ impl Work {
         (self.external, self.internal, self.at_start) = (kinetic + stored, stored, shock);
     }
 
-    /// Goes on with another model: a law that is stiffer at once strikes the body as a load would. The
-    /// balance is judged again from when it has held once. `gained` is the kinetic energy [J] of mass that
-    /// came.
+    /// Continues with another model: a law that is stiffer at once strikes the body as a load would. The
+    /// balance is judged again once it has held. `gained` is the kinetic energy [J] of mass that came.
     pub fn shake(&mut self, gained: f64) {
         self.external += gained;
         (self.shaken, self.steps_off_balance) = (true, 0);
@@ -129,15 +128,15 @@ impl Work {
         }
     }
 
-    /// Goes on from an instant whose sums are entered.
+    /// Ends an instant whose sums are entered.
     pub fn advance(&mut self) {
         self.internal += self.pending_internal;
         self.external += self.pending_external;
         self.step_changes += self.pending_change;
     }
 
-    /// Goes on over whole instants at once, each `step` seconds after the one before, from those sums of
-    /// theirs: internal and external work [J] and damping power [W].
+    /// Passes over several whole instants at once, `step` seconds apart, with their sums: internal and
+    /// external work [J] and damping power [W].
     pub fn pass_over(&mut self, internal: f64, external: f64, damping_power: f64, step: f64) {
         self.internal += internal;
         self.external += external;
@@ -146,12 +145,12 @@ impl Work {
         self.damping_power = 0.0;
     }
 
-    /// Whether the energies were off balance at the last instant.
+    /// True if the energies were off balance at the last instant.
     pub fn is_off_balance(&self) -> bool {
         self.steps_off_balance > 0
     }
 
-    /// Whether they were so too often for a run to go on.
+    /// True if the energies were off balance for too many steps in a row to continue.
     pub fn has_lost_balance(&self) -> bool {
         self.steps_off_balance >= BALANCE_STEPS
     }

@@ -1,19 +1,20 @@
 //! Checks of the critical time step that can be passed over. A check ranks all cells and finds the stiffest
-//! modes of some, which takes longer than a step, so only those are made that can cut steps otherwise.
+//! modes of some, which takes longer than a step. So a check is made only if it may change the parts of
+//! steps.
 //!
-//! From one check to the next, steps keep their parts while the limit stays in a band. The rate at which it
-//! changed says when it leaves the band; up to half of the way there checks are passed over, and near the
-//! edge every one is made. Not foreseen: a limit that falls while neither the least J nor the largest stretch
-//! changes by [`CALM`], within [`LONGEST`] steps.
+//! From one check to the next, steps keep their parts while the limit stays in a band. The rate at which the
+//! limit changed predicts when it leaves the band. Checks are passed over up to half of the way there, and
+//! near the edge every one is made. Not foreseen: a limit that falls while neither the least J nor the
+//! largest stretch changes by [`CALM`], within [`LONGEST`] steps.
 
 use serde::{Deserialize, Serialize};
 
 use crate::forces::Deformed;
 use crate::substeps::margin;
 
-/// Checks are made where the deformation has changed by this factor since the last one …
+/// A check is made once the deformation has changed by this factor since the last check …
 const CALM: f64 = 1.02;
-/// … and so many steps after it.
+/// … or after this number of steps.
 const LONGEST: u64 = 1000;
 
 /// The last check, and how fast the limit changed up to it.
@@ -49,7 +50,7 @@ impl Foresight {
         self.last.map(|last| last.steps)
     }
 
-    /// Whether a check, so many steps done, would leave steps of a length [s] in the same parts.
+    /// True if a check after `steps` steps would leave steps of a length [s] in the same parts.
     pub(crate) fn covers(&self, steps: u64, deformed: &Deformed, step: f64, parts: u32) -> bool {
         let Some(Check { limit, steps: at, deformed: seen, rate: Some(rate) }) = self.last else {
             return false;
@@ -65,8 +66,8 @@ impl Foresight {
 mod tests {
     use super::*;
 
-    /// A limit that falls evenly through the band of whole steps: checks grow rare in the band and frequent
-    /// at its edge, where none is missed.
+    /// A limit falls evenly through the band of whole steps. Checks grow rare in the band and frequent at its
+    /// edge, where none is missed.
     #[test]
     fn a_limit_that_leaves_its_band_is_checked_there() {
         let (step, flat) = (0.9, Deformed::default());
@@ -88,7 +89,7 @@ mod tests {
         assert!(made.len() < 20 && made[..2] == [0, 50] && made.contains(&3600), "{made:?}");
     }
 
-    /// One that stands still is checked every thousand steps, and where the deformation changes.
+    /// A constant limit is checked every thousand steps, and where the deformation changes.
     #[test]
     fn a_limit_that_stands_still_is_checked_now_and_then() {
         let (flat, stretched) =

@@ -1,4 +1,4 @@
-//! What relaxing laws remember.
+//! History of relaxing laws.
 
 use pliant_mechanics::model::Solid;
 use pliant_mechanics::tensor::Symmetric;
@@ -7,17 +7,18 @@ use serde::{Deserialize, Serialize};
 use crate::lanes::LaneNumber;
 use crate::lanes::{PACK, Pack};
 
-/// What a relaxing law remembers of a solid.
+/// History of the relaxing law of a solid.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct History<R> {
-    /// For each pack of cells [`History::slots`] tensors of six packs.
+    /// [`History::slots`] tensors of six packs for each pack of cells.
     pub cells: Vec<Pack<R>>,
-    /// Where pressures are averaged, for each pack of them: Φⁿ⁻¹ and one h per volumetric term.
+    /// Φⁿ⁻¹ and one h per volumetric term for each pack of averaged pressures; empty if pressures are not
+    /// averaged.
     pub pressures: Vec<Pack<R>>,
 }
 
 impl<R: LaneNumber> History<R> {
-    /// At rest.
+    /// Makes the history at rest.
     pub(crate) fn at_rest(solid: &Solid) -> Self {
         let packs = |count: usize, slots: usize| vec![Pack::ZERO; count.div_ceil(PACK) * slots];
         Self {
@@ -40,7 +41,7 @@ impl<R: LaneNumber> History<R> {
         tensors.map(move |packs| Symmetric(std::array::from_fn(|k| packs[k].0[cell % PACK].to_f64())))
     }
 
-    /// Takes on the tensors of a cell.
+    /// Sets the tensors of a cell.
     pub fn set_cell(&mut self, cell: usize, tensors: &[Symmetric<f64>]) {
         for (slot, tensor) in tensors.iter().enumerate() {
             for (k, &entry) in tensor.0.iter().enumerate() {
@@ -49,7 +50,7 @@ impl<R: LaneNumber> History<R> {
         }
     }
 
-    /// What an averaged pressure remembers [Pa].
+    /// Returns the history [Pa] of an averaged pressure.
     pub(crate) fn of_pressure(&self, solid: &Solid, index: usize) -> Vec<f64> {
         let slots = solid.material.prony.volumetric_slots();
         (0..slots).map(|slot| self.pressures[index / PACK * slots + slot].0[index % PACK].to_f64()).collect()

@@ -4,13 +4,13 @@
 //! Data lie in packs of [`PACK`] numbers whatever the width, so that files and results do not depend on it.
 //! The CPU is queried when a force field is made, by checks of the critical time step and by the recovery of
 //! fields: AVX-512 (with the feature `avx512`; 16 numbers in single, 8 in double precision), AVX2 with FMA
-//! (8, 4), SSE4.2 or NEON (4, 2); without any of them the kernels run in plain numbers. Nobody needs
+//! (8, 4), SSE4.2 or NEON (4, 2). Without any of these the kernels run in plain numbers. Nobody needs
 //! `target-cpu=native`; `CentralDifference::in_lanes` chooses other instructions for forces and nodes. Lanes
 //! never mix: with AVX-512 and AVX2 results are the same to the bit (tested for every law and element in
 //! `forces/tests.rs`), elsewhere to round-off.
 //!
 //! This file holds all `unsafe` code of the crate: registers read from and written to arrays, and nodes of a
-//! block read and written without a comparison each, since all are compared once.
+//! block read and written. These accesses take no comparison each, since all offsets are compared once.
 #![allow(unsafe_code)]
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Range, Sub, SubAssign};
@@ -32,10 +32,10 @@ pub const PACK: usize = 16;
 pub struct Pack<R>(pub [R; PACK]);
 
 impl<R: LaneNumber> Pack<R> {
-    /// All zeros.
+    /// Pack of zeros.
     pub(crate) const ZERO: Self = Self([R::ZERO; PACK]);
 
-    /// From the number of each lane.
+    /// Makes a pack from the number of each lane.
     pub(crate) fn from_fn(number: impl FnMut(usize) -> R) -> Self {
         Self(std::array::from_fn(number))
     }
@@ -49,11 +49,11 @@ pub(crate) fn entry<R: LaneNumber>(packs: &[Pack<R>], index: usize) -> R {
 
 /// Numbers of `R` side by side; arithmetic is lane by lane.
 pub trait Lanes<R>: Number {
-    /// How many; divides [`PACK`].
+    /// Number of lanes; divides [`PACK`].
     const WIDTH: usize;
-    /// The same number in every lane.
+    /// Returns one number in every lane.
     fn splat(value: R) -> Self;
-    /// Those of a pack from lane `at` on, a multiple of the width.
+    /// Reads the numbers of a pack from lane `at` on, a multiple of the width.
     fn load(pack: &Pack<R>, at: usize) -> Self;
     /// Writes them into a pack from lane `at` on.
     fn store(self, pack: &mut Pack<R>, at: usize);
@@ -62,9 +62,10 @@ pub trait Lanes<R>: Number {
     /// # Safety
     /// All offsets lie inside.
     unsafe fn gather(vectors: &[[R; 4]], offsets: &[u16; PACK], at: usize) -> [Self; 4];
-    /// Writes vectors from lane `at` on, each where [`row_of_lane`](Self::row_of_lane) tells.
+    /// Writes vectors from lane `at` on, each to its [`row_of_lane`](Self::row_of_lane).
     fn spread(components: [Self; 4], to: &mut Pack<[R; 4]>, at: usize);
-    /// Where the vector of a lane of a pack is written: the order in which registers hold them.
+    /// Returns the row to which the vector of a lane of a pack is written: the order in which registers hold
+    /// vectors.
     fn row_of_lane(lane: usize) -> usize;
     /// Does the work in a function of its own, compiled for these lanes.
     fn call<W: LaneWork<R>>(work: W) -> W::Output;
@@ -72,7 +73,7 @@ pub trait Lanes<R>: Number {
 
 /// A number type that lanes hold. By itself the narrowest of lanes.
 pub trait LaneNumber: Real + Lanes<Self> {
-    /// As many of them as a register of the CPU holds.
+    /// Lanes as wide as a register of the CPU.
     #[doc(hidden)]
     type Wide<S: Simd>: Lanes<Self>;
 }
@@ -138,7 +139,7 @@ pub(crate) fn store_symmetric<R: LaneNumber, L: Lanes<R>>(
 /// Work that is written for any lanes. Every function that it calls must be `#[inline(always)]`, or it is not
 /// compiled for these instructions.
 pub trait LaneWork<R> {
-    /// What comes out.
+    /// Result of the work.
     type Output;
     /// Does it.
     fn run<L: Lanes<R>>(self) -> Self::Output;
@@ -160,7 +161,7 @@ pub enum Instructions {
 }
 
 impl Instructions {
-    /// All, the widest first.
+    /// Every kind of instructions, the widest first.
     pub const ALL: [Self; 5] = [Self::Avx512, Self::Avx2, Self::Sse4, Self::Neon, Self::Plain];
 
     /// The word for them.
@@ -192,9 +193,9 @@ impl std::fmt::Display for Instructions {
     "this processor has no `{wanted}` instructions that pliant was built for; the widest it has are `{widest}`"
 )]
 pub struct MissingInstructions {
-    /// What was asked for.
+    /// Instructions that were asked for.
     pub wanted: Instructions,
-    /// What there is.
+    /// Widest instructions that the processor has.
     pub widest: Instructions,
 }
 
@@ -286,11 +287,11 @@ unsafe fn proof<S: Simd>() -> S {
     unsafe { std::mem::transmute_copy(&()) }
 }
 
-/// Where packs of cells have their nodes in an array of vectors of their block. Numbers are kept as offsets,
-/// which the processor adds to an address without a shift, and the largest of a block is found once for all
-/// steps: a comparison for each access costs a tet 1 ns of 9.
+/// Places of the nodes of packs of cells in the array of their block's vectors. Numbers are kept as offsets,
+/// which the processor adds to an address without a shift. The largest offset of a block is found once for
+/// all steps: a comparison for each access costs a tet 1 ns of 9.
 pub(crate) struct Places<R, const N: usize> {
-    /// In [`Unit`]s, multiples of a vector.
+    /// Offsets in [`Unit`]s, multiples of a vector.
     offsets: Vec<[[u16; PACK]; N]>,
     /// The largest of each block.
     most: Vec<u16>,
@@ -308,13 +309,13 @@ const fn units<R>() -> usize {
 }
 
 impl<R: LaneNumber, const N: usize> Places<R, N> {
-    /// Whether offsets reach all nodes of a block of so many packs.
+    /// True if offsets reach all nodes of a block of `packs` packs.
     pub(crate) const fn can_number(packs: usize) -> bool {
         units::<R>() * packs * PACK * N <= 1 << 16
     }
 
-    /// From the numbers of the nodes of packs of cells, and how many packs a block has: not more than
-    /// [they reach](Self::can_number).
+    /// Makes the places from the node numbers of packs of cells, and the number of packs in a block. A block
+    /// has at most as many packs as [offsets reach](Self::can_number).
     pub(crate) fn new(packs: impl Iterator<Item = [[u16; PACK]; N]>, per_block: usize) -> Self {
         let offset = |place: u16| place * units::<R>() as u16;
         let offsets: Vec<_> = packs.map(|pack| pack.map(|places| places.map(offset))).collect();
@@ -411,7 +412,7 @@ unsafe fn at_offset<R: Copy>(vectors: &[[R; 4]], offset: u16) -> [R; 4] {
     unsafe { *vectors.as_ptr().cast::<Unit>().add(usize::from(offset)).cast() }
 }
 
-/// Where it lies.
+/// Returns a pointer to the vector at an offset.
 ///
 /// # Safety
 /// The offset lies inside.
@@ -427,14 +428,14 @@ pub(crate) fn plus<R: LaneNumber>(a: [R; 4], b: [R; 4]) -> [R; 4] {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]]
 }
 
-/// Which lane a row of four numbers becomes where pulp turns four registers full of rows into components: the
-/// row at `place` among the `rows` of a register. Rows are loaded in this order, so that lanes come out in
-/// theirs.
+/// Returns the lane that a row of four numbers becomes when pulp turns four registers full of rows into
+/// components. The row is at `place` among the rows of a register. Rows are loaded in this order, so that the
+/// lanes are in theirs.
 const fn single_lane(_rows: usize, register: usize, place: usize) -> usize {
     4 * place + register
 }
 
-/// The same in double precision.
+/// Returns the lane of a row as [`single_lane`] does, in double precision.
 const fn double_lane(rows: usize, register: usize, place: usize) -> usize {
     if rows == 2 { register / 2 * 4 + 2 * place + register % 2 } else { register }
 }
@@ -453,7 +454,7 @@ macro_rules! wide {
     ($wide:ident, $type:ty, $vector:ident, $guess:expr, $iterations:literal,
      $add:ident, $sub:ident, $mul:ident, $div:ident, $neg:ident, $mul_add:ident, $sqrt:ident, $max:ident, $abs:ident,
      $and:ident, $or:ident, $splat:ident, $slice:ident, $slice_mut:ident, $deinterleave:ident, $interleave:ident, $lane_of_row:ident, $row_of_lane:ident) => {
-        /// As many numbers as a register holds.
+        /// Numbers that fill a register.
         #[derive(Clone, Copy, Debug)]
         #[repr(transparent)]
         pub struct $wide<S: Simd>(S::$vector);
@@ -471,8 +472,8 @@ macro_rules! wide {
                 Self(unsafe { std::mem::transmute_copy(&[value; PACK]) })
             }
 
-            /// Which lane a row of four numbers becomes where four registers full of rows are turned into
-            /// components.
+            /// Returns the lane that a row of four numbers becomes when four registers full of rows are
+            /// turned into components.
             #[inline(always)]
             const fn lane_of_row(row: usize) -> usize {
                 let per_register = Self::WIDTH.div_ceil(4);

@@ -1,6 +1,6 @@
 //! Total Lagrangian explicit dynamics (Miller et al. 2007) of the solids of a
-//! [`Model`](pliant_mechanics::Model), and equilibria by dynamic relaxation: force kernels in lanes, central
-//! differences, the critical time step and its watch. SI units throughout.
+//! [`Model`](pliant_mechanics::Model), and equilibria by dynamic relaxation. The crate has force kernels in
+//! lanes, central differences, and the critical time step with its watch. SI units throughout.
 //!
 //! [`Model`](pliant_mechanics::Model) is constant, [`State`] changes, [`CentralDifference`] advances a state
 //! on a model:

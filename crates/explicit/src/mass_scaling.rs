@@ -1,38 +1,38 @@
 //! Mass scaling: mass for the nodes that limit the critical time step.
 //!
-//! *Which nodes.* Of a cell of volume V and modulus M = λ+2μ, v·K_e v ≤ V M (Σ_a |B_a| |v_a|)² ≤ Σ_a
-//! k_a |v_a|² with k_a = V M |B_a| Σ_b |B_b|, by Cauchy and Schwarz. Summed over the cells, k_a is the
-//! stiffness of a node and Δt_a = 2/√(k_a/m_a) its nodal time step, below which no assembly is unstable
-//! (Gershgorin). It is that of OpenRadioss (`/DT/NODA`). A node whose nodal time step is below a threshold T
-//! gets the mass k_a T²/4. Neighbours count: a sliver between large cells needs less than alone.
+//! *Which nodes.* Consider a cell of volume V and modulus M = λ+2μ. By Cauchy and Schwarz, v·K_e v ≤ V M
+//! (Σ_a |B_a| |v_a|)² ≤ Σ_a k_a |v_a|². Here k_a = V M |B_a| Σ_b |B_b|. Summed over the cells, k_a is the
+//! stiffness of a node, and Δt_a = 2/√(k_a/m_a) is its nodal time step. No assembly is unstable below the
+//! smallest one (Gershgorin). OpenRadioss uses the same nodal time step (`/DT/NODA`). A node whose nodal time
+//! step is below a threshold T gets the mass k_a T²/4. Neighbours count: a sliver between large cells needs
+//! less than alone.
 //!
-//! *How much.* The assembled model is stable at 1.3 to 2 times the smallest nodal time step. So the threshold
-//! is searched, by bisection, that brings the critical time step of the assembled model to the target.
+//! *How much.* The assembled model is stable at 1.3 to 2 times the smallest nodal time step. So a bisection
+//! searches the threshold that brings the critical time step of the assembled model to the target.
 
 use pliant_mechanics::model::{Contradiction, FREE, MassScaling, Model, Solid, with_cells};
 use pliant_mechanics::tensor::dot;
 
 use crate::critical_step::assembled_about;
 
-/// How close to the smallest threshold a search ends, as a fraction, where each look needs the critical time
-/// step …
+/// Relative tolerance of a search for the smallest threshold, if each look needs the critical time step …
 const STEP_TOLERANCE: f64 = 0.01;
 /// … and where it needs a sum over the nodes.
 const SHARE_TOLERANCE: f64 = 1e-9;
 
-/// How far mass scaling goes.
+/// Target of mass scaling.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Goal {
     /// The critical time step of the assembled model [s], with little more mass than it needs.
     TargetStep(f64),
-    /// Added mass over that of the materials.
+    /// Added mass over the mass of the materials.
     Share(f64),
 }
 
-/// Makes the nodes heavier that limit the critical time step at rest, once solids and constraints are there.
-/// Added mass counts for inertia (and with it for mass-proportional damping) only: loads and gravity act on
-/// the mass of the material, so that equilibria and their reactions stay as they are. A goal that is reached
-/// already adds nothing.
+/// Adds mass to the nodes that limit the critical time step at rest, once solids and constraints are there.
+/// Added mass counts for inertia only, and with it for mass-proportional damping. Loads and gravity act on
+/// the mass of the material, so that equilibria and their reactions stay the same. A goal already reached
+/// adds nothing.
 ///
 /// # Errors
 /// If constraints contradict each other.
@@ -58,7 +58,7 @@ pub fn scale_mass(model: &mut Model, goal: Goal) -> Result<(), Contradiction> {
     Ok(())
 }
 
-/// What the nodal time steps follow from, one entry per node.
+/// Data for the nodal time steps, one entry per node.
 struct NodalSteps {
     /// Mass of the material [kg].
     mass: Vec<f64>,
@@ -115,7 +115,7 @@ impl NodalSteps {
 }
 
 /// Adds k_a [N/m] of every cell of a solid at rest. Hourglass control adds c μ V Σ|B|² at most, as its
-/// patterns are orthogonal to the rest; where it grows with the law, the watch over the step looks at both.
+/// patterns are orthogonal to the rest. If it grows with the law, the watch over the step looks at both.
 fn add_stiffness(solid: &Solid, stiffness: &mut [f64]) {
     let modulus = solid.longitudinal_modulus();
     with_cells!(&solid.cells, block => {

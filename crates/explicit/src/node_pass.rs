@@ -1,5 +1,5 @@
-//! The nodes of a step: their increments from the forces of an instant, what prescribed ones take to move,
-//! and the sums of which energies come.
+//! The nodes of a step: increments from the forces of an instant, forces that move prescribed nodes, and the
+//! sums for the energies.
 
 use pliant_mechanics::model::{Amplitudes, FREE, component, placed};
 use pliant_mechanics::tensor::Vector;
@@ -15,7 +15,7 @@ use crate::step_control::Lengths;
 /// Nodes per parallel task.
 pub(crate) const CHUNK: usize = 384;
 
-/// Sums of a block are kept apart in so many lanes.
+/// Number of lanes in which sums of a block are kept apart.
 const LANES: usize = 16;
 
 /// A node of which a component moves as prescribed.
@@ -89,10 +89,10 @@ pub(crate) struct NodePass<'a, R> {
     pub(crate) pace: Pace<R>,
     pub(crate) forces: &'a InternalForces<R>,
     pub(crate) applied: &'a AppliedForces<R>,
-    /// Of all nodes.
+    /// Mass of each component, for all nodes.
     pub(crate) mass: &'a [Vector<R>],
     pub(crate) damping: &'a [Vector<R>],
-    /// Those of these nodes, increasing.
+    /// Held nodes of this pass, increasing.
     pub(crate) held: &'a [Held],
     /// Factors on the amplitudes of each constraint now and after the step.
     pub(crate) factors: &'a [[[f64; 2]; 2]],
@@ -101,7 +101,7 @@ pub(crate) struct NodePass<'a, R> {
     pub(crate) reaction: &'a mut [Vector<R>],
     /// Earlier internal forces on these nodes, where they damp …
     pub(crate) past: Option<Past<'a, R>>,
-    /// … and room for those of the instant [N].
+    /// … and room for the internal forces of the instant [N].
     pub(crate) internal: &'a mut [Vector<R>],
 }
 
@@ -177,7 +177,7 @@ impl<R: LaneNumber> LaneWork<R> for Add<'_, R> {
     }
 }
 
-/// What a block of nodes comes with.
+/// Input of a block of nodes.
 #[derive(Clone, Copy)]
 struct Known<T> {
     before: T,
@@ -185,7 +185,7 @@ struct Known<T> {
     damping: T,
 }
 
-/// That of whole blocks.
+/// Input of a whole block.
 type Whole<'a, R> = Known<&'a [Vector<R>; BLOCK]>;
 
 impl<R: LaneNumber> Known<[Vector<R>; BLOCK]> {
@@ -196,7 +196,7 @@ impl<R: LaneNumber> Known<[Vector<R>; BLOCK]> {
 }
 
 impl<'a, R: LaneNumber> Known<&'a [Vector<R>]> {
-    /// With nodes at rest beyond the last one, for which there is room.
+    /// Fills up the block with nodes at rest beyond the last node, for which there is room.
     #[inline(always)]
     fn filled_up(self, room: &'a mut Known<[Vector<R>; BLOCK]>) -> Whole<'a, R> {
         let fill = |own: &'a [Vector<R>], room: &'a mut [Vector<R>; BLOCK]| match own.first_chunk() {
@@ -214,11 +214,11 @@ impl<'a, R: LaneNumber> Known<&'a [Vector<R>]> {
     }
 }
 
-/// What is found of a block of nodes; zero beyond the last node.
+/// Results of a block of nodes; zero beyond the last node.
 struct Block<R> {
     next: [Vector<R>; BLOCK],
     internal: [Vector<R>; BLOCK],
-    /// The same with what blocks of cells leave beside it.
+    /// Internal forces as in `internal`, with the fourth number of the blocks of cells.
     parts: [Quad<R>; BLOCK],
     /// Zero but for what pushes now.
     external: [Vector<R>; BLOCK],

@@ -35,9 +35,8 @@ pub struct CellFields {
     pub pk2_stress: Symmetric<f64>,
     /// Cauchy stress [Pa].
     pub cauchy_stress: Symmetric<f64>,
-    /// Strain energy per reference volume [J/m³] of the instantaneous elastic law; its volumetric part is
-    /// that of the averages that the element takes, so that Σ V ψ is the energy that the forces are the
-    /// gradient of.
+    /// Strain energy per reference volume [J/m³] of the instantaneous elastic law. Its volumetric part uses
+    /// the averages that the element takes: the forces are the gradient of Σ V ψ.
     pub energy_density: f64,
     /// Unit fibre at rest; `None` if the law has none.
     pub fibre: Option<Vector<f64>>,
@@ -79,19 +78,20 @@ pub struct Recovery<'a, R> {
     averages: Vec<Averages>,
 }
 
-/// The energy [J] stored in a state whose nodes start displaced, with that of hourglass control [J].
+/// Returns the energy [J] stored in a state whose nodes start displaced, including `hourglass` [J] of
+/// hourglass control.
 pub fn stored_at_start<R: LaneNumber>(model: &Model, state: &State<R>, hourglass: f64) -> f64 {
     let is_moved = state.displacement.iter().flatten().any(|&u| u != R::ZERO);
     if is_moved { Recovery::new(model, state).stored_energy() + hourglass } else { 0.0 }
 }
 
-/// What the cells of a solid take from averages.
+/// Averages that the cells of a solid use.
 enum Averages {
-    /// Nothing.
+    /// No averages.
     None,
-    /// Of their volumetric part.
+    /// Averages of the volumetric part of the law.
     Volumetric(Vec<Dilatation>),
-    /// Their volume ratio J̄, minus 1.
+    /// Averaged volume ratio J̄ of each cell, minus 1.
     VolumeChange(Vec<f64>),
 }
 
@@ -124,8 +124,8 @@ impl<'a, R: LaneNumber> Recovery<'a, R> {
         self.model.solids.iter().enumerate().map(of_solid).sum()
     }
 
-    /// `width` numbers of each cell of a solid, which `of` writes from its number and fields: fields of all
-    /// cells would take a lot of memory.
+    /// Returns `width` numbers of each cell of a solid, which `of` writes from its number and fields. Fields
+    /// of all cells would take a lot of memory.
     pub fn numbers(
         &self,
         solid: usize,
@@ -184,7 +184,7 @@ impl<'a, R: LaneNumber> Recovery<'a, R> {
         gradient(&self.moved::<N>(solid, cell), shape)
     }
 
-    /// How far the nodes of a cell have moved beyond its first node [m].
+    /// Returns the displacements [m] of the nodes of a cell relative to its first node.
     fn moved<const N: usize>(&self, solid: usize, cell: usize) -> [Vector<f64>; N] {
         let nodes = self.model.solids[solid].cells.nodes(cell);
         let at = |a: usize| -> Vector<f64> { cast(self.state.displacement[nodes[a] as usize]) };
@@ -192,7 +192,7 @@ impl<'a, R: LaneNumber> Recovery<'a, R> {
         from_fn(|a| sub(at(a), origin))
     }
 
-    /// What a cell with one point remembers [Pa].
+    /// Returns the history [Pa] of a cell with one point.
     fn history(&self, solid: usize, cell: usize) -> Vec<Symmetric<f64>> {
         self.state.history[solid].of_point(&self.model.solids[solid], cell, 0).collect()
     }
@@ -256,20 +256,20 @@ impl<'a, R: LaneNumber> Recovery<'a, R> {
 const NO_TENSOR: Tensor<Pack<f64>> = Tensor([[Pack::ZERO; 3]; 3]);
 const NO_SYMMETRIC: Symmetric<Pack<f64>> = Symmetric([Pack::ZERO; 6]);
 
-/// What is known of a pack of points.
+/// Input of a pack of points.
 struct Given {
     /// ∂u/∂X that the law sees.
     gradient: Tensor<Pack<f64>>,
     fibres: [Vector<Pack<f64>>; MOST_FAMILIES],
     /// Parts of the elastic stress that do not relax.
     remaining: Split<f64>,
-    /// What relaxing parts remember [Pa].
+    /// Stress [Pa] that relaxing parts remember.
     lag: Symmetric<Pack<f64>>,
     /// U' [Pa] in place of the volumetric stress of the law.
     pressure: Option<Pack<f64>>,
 }
 
-/// What is found of a pack of points; see [`CellFields`].
+/// Fields found at a pack of points; see [`CellFields`].
 struct Found {
     gradient: Tensor<Pack<f64>>,
     volume_ratio: Pack<f64>,
@@ -359,7 +359,7 @@ impl<T: Law> LaneWork<f64> for AtPoints<'_, T> {
     }
 }
 
-/// Whether cells are solid, with one point each.
+/// True if cells are solid, with one point each.
 fn takes_packs(cells: &Cells) -> bool {
     cells.points() == 1 && !matches!(cells, Cells::Membrane(..) | Cells::Bar(..))
 }
@@ -438,7 +438,7 @@ fn bar_fields(
     let relaxed = solid.material.prony.stress(elastic, history).0[0];
     let stress = if cord.tension_only { relaxed.max(0.0) } else { relaxed };
     let tangent = scale(rest.between(), 1.0 / rest.length());
-    // Length over that at rest, of which the mesh tells.
+    // Length over the length at rest, from the mesh.
     let grown = pull.length / rest.length();
     let mut gradient = Tensor::IDENTITY;
     gradient.add_outer(sub(scale(pull.along, grown), tangent), tangent);

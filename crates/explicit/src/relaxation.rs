@@ -15,7 +15,7 @@ pub struct Relaxation<R> {
     volumetric: Series<R>,
 }
 
-/// Those of one part.
+/// Coefficients of one part.
 #[derive(Clone, Debug)]
 pub struct Series<R> {
     /// 1 − Σ a.
@@ -85,17 +85,17 @@ impl<R: LaneNumber> Relaxation<R> {
         }
     }
 
-    /// Those of the isochoric part.
+    /// Returns the coefficients of the isochoric part.
     pub fn isochoric(&self) -> &Series<R> {
         &self.isochoric
     }
 
-    /// Those of the volumetric part.
+    /// Returns the coefficients of the volumetric part.
     pub fn volumetric(&self) -> &Series<R> {
         &self.volumetric
     }
 
-    /// Takes on the coefficients of the same series for steps of `step` seconds.
+    /// Sets the coefficients of the same series for steps of `step` seconds.
     pub fn set_step(&mut self, prony: &Prony, step: f64) {
         self.isochoric.set_step(&prony.isochoric, prony.update, step);
         self.volumetric.set_step(&prony.volumetric, prony.update, step);

@@ -5,8 +5,8 @@ use crate::stepper::SteppedIn;
 
 /// A number type that solids are solved in: `f32` or `f64`.
 ///
-/// A function that is generic over it is compiled in every crate that calls it. What is large, the solvers
-/// among it, is entered by functions of these traits that are not generic: its machine code lies in this
+/// A function that is generic over it is compiled in every crate that calls it. Large functions, such as the
+/// solvers, are entered by functions of these traits that are not generic. Their machine code lies in this
 /// library alone.
 pub trait Scalar: SteppedIn + RelaxedIn {}
 

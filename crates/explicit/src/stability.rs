@@ -1,16 +1,16 @@
-//! The critical time step of a deformed state, monitored during a run. A run takes 0.9 of that at rest. It is
-//! that of the assembled model, 2/ω_max, where nothing else is said.
+//! The critical time step of a deformed state, monitored during a run. A run takes 0.9 of the critical time
+//! step at rest. Unless stated otherwise, this is the one of the assembled model, 2/ω_max.
 //!
 //! A cell's own limit is Δt_e = 2/√(λ_e n/(ρV)) with λ_e the largest eigenvalue of its current stiffness
-//! (`tangent.rs`); no assembly moves faster than its fastest cell alone (Irons and Treharne). From the
-//! critical time step L of a reference state, at first rest, the current limit is estimated cell by cell:
-//! Δt_cr ≈ min_e max(Δt_e, L r_e). r_e² is the stiffness of the cell in the reference state over the current
-//! one, the smaller of two ratios: over all modes, and over plane waves n⊗y. The first ratio alone misses a
-//! compression along one axis, as does any bound V M Σ|b_a|²: on the glued cube it stays at 0.94 where the
-//! critical time step falls to 0.83. A cell slower than the assembly thus counts with its own limit, and one
-//! that the assembly holds back, with its change. Compared with the critical time step of deformed bodies,
-//! the estimate is 0 to 25 % too small; with fibres that carry tension only, whose stiffness jumps at rest,
-//! up to 4.3 % too large: `lab/validation/tests/stability.rs`.
+//! (`tangent.rs`). No assembly moves faster than its fastest cell alone (Irons and Treharne). The current
+//! limit is estimated cell by cell as Δt_cr ≈ min_e max(Δt_e, L r_e). Here L is the critical time step of a
+//! reference state, at first rest. The square r_e² is the stiffness of the cell in the reference state over
+//! the current one. The smaller of two ratios counts: over all modes, and over plane waves n⊗y. The first
+//! ratio alone misses a compression along one axis, as does any bound V M Σ|b_a|². On the glued cube it stays
+//! at 0.94 where the critical time step falls to 0.83. A cell slower than the assembly thus counts with its
+//! own limit, and one that the assembly holds back, with its change. Compared with the critical time step of
+//! deformed bodies, the estimate is 0 to 25 % too small. With fibres that carry tension only, whose stiffness
+//! jumps at rest, it is up to 4.3 % too large: `lab/validation/tests/stability.rs`.
 //!
 //! *When.* Every `CHECK_EVERY` steps, and at once where the least J or the largest stretch √(1 + |C − I|)
 //! has changed by [`CHANGE`]. The force pass finds both at no cost. Checks that leave the parts as they are,
@@ -22,17 +22,17 @@
 //! pressure of their own. Hourglass control counts with its current factor. Loads that follow the surface do
 //! not count.
 //!
-//! *Then.* If the estimate would change the steps, the critical time step of the current state is computed,
-//! by Lanczos' iteration of many force evaluations, and the current state becomes the reference. This happens
-//! once in `REFERENCE_EVERY` steps at most, and always before [`OnUnstable::Stop`] ends a run. If a part of
-//! a step takes more than [`KEEP`] of the limit, whole steps are cut into equal parts that take `RESERVE`
-//! at most. Fewer parts are used again once they have kept this reserve for `REJOIN_AFTER` steps: a
+//! *Then.* If the estimate would change the steps, Lanczos' iteration computes the critical time step of the
+//! current state from many force evaluations. The current state becomes the reference. This happens once in
+//! `REFERENCE_EVERY` steps at most, and always before [`OnUnstable::Stop`] ends a run. If a part of a step
+//! takes more than [`KEEP`] of the limit, whole steps are cut into equal parts that take `RESERVE` at most.
+//! Fewer parts are used again once they have kept this reserve for `REJOIN_AFTER` steps. Otherwise a
 //! vibrating body would be cut and rejoined in each period, at phases that add energy. Velocities continue
 //! (formula in `stepper.rs`), and relaxing laws take coefficients of the new length. Observers, checkpoints
 //! and step counts see whole steps only.
 //!
 //! *Halvings.* A run that fails all the same can go back to an earlier state and
-//! [halve its steps](State::halve_steps): whole steps are then cut into parts of at most ½, ¼ or ⅛ of their
+//! [halve its steps](State::halve_steps). Whole steps are then cut into parts of at most ½, ¼ or ⅛ of their
 //! length for good.
 //!
 //! The state holds all that monitoring needs to resume ([`Stability`] and [`State::reference`]). Stiffnesses
@@ -67,7 +67,7 @@ const SHARE: usize = 256;
 /// … rounded up to a multiple of this, so that both orders fill packs.
 const LEAST: usize = PACK / 2;
 
-/// What a run does when the limit falls below its step.
+/// Response of a run to a limit below its step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum OnUnstable {
@@ -76,7 +76,7 @@ pub enum OnUnstable {
     Substep,
     /// End with an error.
     Stop,
-    /// Go on at the same step; the smallest limit is reported.
+    /// Continue at the same step; the smallest limit is reported.
     Report,
 }
 
@@ -93,21 +93,21 @@ pub struct Monitor {
 struct Watch {
     /// L [s].
     limit: f64,
-    /// Of each cell in the reference state, once it was needed.
+    /// Stiffness of each cell in the reference state, once it was needed.
     reference: Vec<Option<Stiffness>>,
     /// λ of hourglass control alone at rest, over V [Pa/m²].
     hourglass: Vec<f64>,
     /// Σ B_a ⊗ B_a [1/m²] of packs of cells, as [`gradient_square_of`]: found once, a check would spend much
     /// of its time there.
     square: Vec<Symmetric<Pack<f64>>>,
-    /// 1/(|G| (λ+2μ) max(Δt_e, L)²) with the element bound Δt_e at rest: brings the guesses of all cells to
-    /// one scale.
+    /// Weight 1/(|G| (λ+2μ) max(Δt_e, L)²), with the element bound Δt_e at rest. It brings the guesses of all
+    /// cells to one scale.
     weight: Vec<f64>,
     /// The cells with their [ranks](ranked) in two orders; once they are picked, those that stand first come
     /// first.
     order: [Vec<u64>; 2],
-    /// The cells that are checked closely, those of the first order before those of the second, their limits
-    /// [s] and references.
+    /// The cells that are checked closely, in the first order and then in the second, with their limits [s]
+    /// and references.
     picked: Vec<u32>,
     found: Vec<(f64, Stiffness)>,
 }
@@ -120,12 +120,12 @@ impl Monitor {
         Self { on_unstable, solids, reference: None }
     }
 
-    /// What to do when the limit falls below the step.
+    /// Returns the response to a limit below the step.
     pub fn on_unstable(&self) -> OnUnstable {
         self.on_unstable
     }
 
-    /// Takes on the reference of a state, where it has another one than before.
+    /// Adopts the reference of a state, if it differs from the present one.
     pub(crate) fn refer_to<R>(&mut self, state: &State<R>) {
         let reference = state.stability.reference;
         if let (true, Some((limit, _))) = (self.reference != reference, reference) {
@@ -137,8 +137,8 @@ impl Monitor {
         self.reference = reference;
     }
 
-    /// Whether an estimate needs the critical time step: it asks for other than whole steps, and the last one
-    /// is long past.
+    /// True if an estimate needs the critical time step, because whole steps exceed the limit. Except for
+    /// [`OnUnstable::Stop`], the last critical time step has to be long past.
     pub(crate) fn doubts<R>(&self, state: &State<R>, limit: f64, step: f64, now: u32) -> bool {
         let rested = state
             .stability
@@ -171,7 +171,8 @@ impl Monitor {
             .min_by(|a, b| a.0.total_cmp(&b.0))
     }
 
-    /// The same with every cell checked closely, as a measure of what [`limit`](Self::limit) leaves out.
+    /// Returns the limit with every cell checked closely, as a measure of the cells that
+    /// [`limit`](Self::limit) leaves out.
     pub fn limit_of_all<R: LaneNumber>(
         &self,
         model: &Model,
@@ -343,7 +344,7 @@ pub fn cell_limit<R: LaneNumber>(
     limits_alone(model, &model.solids[solid], &[cell as u32], displacement)[0]
 }
 
-/// The same of all cells of a solid.
+/// Returns the limit [s] of each cell of a solid on its own.
 pub fn cell_limits<R: LaneNumber>(model: &Model, solid: usize, displacement: &[Vector<R>]) -> Vec<f64> {
     let solid = &model.solids[solid];
     let cells: Vec<u32> = (0..solid.cells.len() as u32).collect();
@@ -354,7 +355,7 @@ pub fn cell_limits<R: LaneNumber>(model: &Model, solid: usize, displacement: &[V
     cells.par_chunks(PACK).flat_map_iter(of).collect()
 }
 
-/// The same of a pack of cells.
+/// Returns the limit [s] of each cell of a pack on its own.
 fn limits_alone<R: LaneNumber>(
     model: &Model,
     solid: &Solid,
@@ -374,7 +375,7 @@ fn limits_alone<R: LaneNumber>(
     limits
 }
 
-/// How many of some cells are checked closely for each order.
+/// Returns the number of cells that are checked closely for each order.
 fn picked(count: usize) -> usize {
     (count / SHARE).max(1).next_multiple_of(LEAST).min(count)
 }
@@ -384,7 +385,7 @@ fn finite((limit, cell): (f64, usize)) -> Option<(f64, usize)> {
     limit.is_finite().then_some((limit, cell))
 }
 
-/// The smaller limit; of equal ones that of the first cell.
+/// Returns the smaller limit; of equal limits, the one with the lower cell number.
 fn smaller(a: Option<(f64, usize)>, b: Option<(f64, usize)>) -> Option<(f64, usize)> {
     match (a, b) {
         (Some(x), Some(y)) => Some(if (y.0, y.1) < (x.0, x.1) { y } else { x }),
@@ -467,12 +468,12 @@ struct Ranks<'a, R> {
     first: usize,
     /// Σ B_a ⊗ B_a [1/m²].
     square: &'a Symmetric<Pack<f64>>,
-    /// What brings guesses to one scale.
+    /// Weights that bring guesses to one scale.
     weight: &'a [f64],
     /// κ and λ + 2μ at rest [Pa].
     bulk: f64,
     rest: f64,
-    /// By the squared speed of an isotropic guess, and by the squared stretch.
+    /// Ranks by the squared speed of an isotropic guess, and by the squared stretch.
     speeds: &'a mut [u64],
     stretches: &'a mut [u64],
 }

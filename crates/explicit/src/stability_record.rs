@@ -9,8 +9,8 @@ use crate::forces::Deformed;
 use crate::foresight::Foresight;
 use crate::substeps::{MOST_HALVINGS, MOST_SUBSTEPS};
 
-/// How a run cuts its steps, and the limits that its checks found. The state holds this record, so a copy of
-/// the state continues with the same bits.
+/// Record of the cuts of a run's steps, and of the limits that its checks found. The state holds this record,
+/// so a copy of the state continues with the same bits.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Stability {
     /// Parts of the step under way, or of the last one.
@@ -30,7 +30,7 @@ pub struct Stability {
     /// Steps at the start of which the limit was known to be below the whole step.
     #[serde(deserialize_with = "count::read")]
     pub steps_below: u64,
-    /// How often whole steps were given up for substeps.
+    /// Number of times that whole steps were given up for substeps.
     #[serde(deserialize_with = "count::read")]
     pub cuts: u32,
     /// Time [s] of the first cut.
@@ -43,7 +43,7 @@ pub struct Stability {
     /// Substeps beyond one a step, in all.
     #[serde(deserialize_with = "count::read")]
     pub extra_steps: u64,
-    /// How often the steps were halved after a failure.
+    /// Number of times that the steps were halved after a failure.
     pub halvings: u32,
     /// Steps done when the limit last asked for as many parts as there are.
     pub(crate) needed_at: u64,
@@ -57,7 +57,7 @@ pub struct Stability {
     pub(crate) deformed: Deformed,
     /// Steps done at the last check.
     pub(crate) checked_at: u64,
-    /// Which checks are passed over.
+    /// Checks that are passed over.
     pub(crate) foresight: Foresight,
 }
 
@@ -88,7 +88,7 @@ impl Default for Stability {
 }
 
 impl Stability {
-    /// Whether it can be of a state between two steps of a model, so many steps done.
+    /// True if the record fits a state between two steps of a model, after `steps` steps.
     pub fn fits(&self, model: &Model, steps: u64) -> bool {
         let known = |found: &StepLimit| {
             model.solids.get(found.solid).is_some_and(|solid| found.cell < solid.cells.len())
@@ -107,8 +107,9 @@ impl Stability {
             && self.last.iter().chain(&self.smallest).all(known)
     }
 
-    /// Factors of the damping forces after a step of `before` [s], where the highest modes are dissipated or
-    /// not, with damping by stiffness [s]; all zero before the first force is known.
+    /// Returns the factors of the damping forces after a step of `before` [s], with damping by stiffness [s].
+    /// `dissipates` adds dissipation of the highest modes. All factors are zero before the first force is
+    /// known.
     pub fn damping_factors(&self, dissipates: bool, damping: f64, before: f64) -> DampingFactors {
         let dissipation = if dissipates { DISSIPATION } else { 0.0 };
         let known =

@@ -13,7 +13,7 @@ use crate::lanes::LaneNumber;
 use crate::stability_record::Stability;
 use crate::substeps::MOST_HALVINGS;
 
-/// What a stepper advances.
+/// State that a stepper advances.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct State<R> {
     /// Time [s].
@@ -32,7 +32,7 @@ pub struct State<R> {
     pub history: Vec<History<R>>,
     /// Energies so far.
     pub work: Work,
-    /// How steps are cut, and what was seen of the largest stable one.
+    /// Record of the cuts of steps, and of the limits found.
     pub stability: Stability,
     /// Displacements [m] of the state whose critical time step is known, at first rest; see
     /// [`Monitor`](crate::stability::Monitor).
@@ -45,8 +45,9 @@ pub struct State<R> {
     pub gripped: Vec<Gripped>,
     /// Nodes that touch something, increasing, with how far each has slid on it since its touch began [m].
     pub slip: Vec<(u32, f64)>,
-    /// Whether forces were found at the instant: their work is then entered, laws have relaxed to it, and the
-    /// limit of the step is known. Who finds them again enters nothing twice.
+    /// True if forces were found at the instant. Their work is then entered, laws have relaxed to the
+    /// instant, and the limit of the step is known. A stepper that finds the forces again enters nothing
+    /// twice.
     pub evaluated: bool,
 }
 
@@ -69,7 +70,7 @@ pub struct Work {
     /// Steps in a row that were off balance.
     #[serde(deserialize_with = "count::read")]
     pub(crate) steps_off_balance: u32,
-    /// Whether the model was changed, and the energies have not been balanced since.
+    /// True if the model was changed, and the energies have not been balanced since.
     pub(crate) shaken: bool,
     /// First half of the internal work of the step under way.
     pub(crate) pending_internal: f64,
@@ -112,8 +113,8 @@ fn place_collective(model: &Model, own: &Constraint, owners: &[[u32; 3]], displa
 }
 
 impl<R: LaneNumber> State<R> {
-    /// At rest at time 0, prescribed nodes and all that follows them where their motion starts. Nodes of a
-    /// mean shift together, those around a prescribed volume along its gradient.
+    /// Makes the state at rest at time 0. Prescribed nodes and their followers are where their motion starts.
+    /// Nodes of a mean shift together, nodes around a prescribed volume along its gradient.
     pub fn at_rest(model: &Model) -> Self {
         let mut displacement = vec![[0.0; 3]; model.node_count()];
         if let Ok(owners) = model.constrained_components() {
@@ -148,7 +149,7 @@ impl<R: LaneNumber> State<R> {
         }
     }
 
-    /// Has room for the internal forces of the last two instants.
+    /// Makes room for the internal forces of the last two instants.
     pub fn keep_forces(&mut self) {
         let nodes = self.displacement.len();
         if self.forces[0].len() != nodes {
@@ -157,12 +158,13 @@ impl<R: LaneNumber> State<R> {
         }
     }
 
-    /// Where a tool or a jaw goes, if it was driven; counted among the rigid things of the contacts.
+    /// Returns the way of a tool or a jaw that was driven; `rigid` counts among the rigid things of the
+    /// contacts.
     pub fn leg(&self, rigid: usize) -> Option<&Leg> {
         self.driven.iter().find(|(own, _)| *own as usize == rigid).map(|(_, leg)| leg)
     }
 
-    /// How far a rigid thing lags behind its trajectory, if its force is limited.
+    /// Returns the lag of a rigid thing behind its trajectory, if its force is limited.
     pub fn lag(&self, rigid: usize) -> Option<&Lag> {
         self.lags.iter().find(|lag| lag.number() == rigid)
     }
@@ -173,8 +175,8 @@ impl<R: LaneNumber> State<R> {
         self.driven.push((rigid as u32, leg));
     }
 
-    /// Brings it from a model to another one of the same mesh, after a (sub)step of a length [s]:
-    /// displacements, velocities and what relaxing laws remember stay. The kinetic energy of mass that comes
+    /// Takes the state from a model to another one of the same mesh, after a (sub)step of `before` [s].
+    /// Displacements, velocities and the history of relaxing laws stay. The kinetic energy of mass that comes
     /// or goes is external work.
     pub fn change_model(&mut self, from: &Model, to: &Model, before: f64) {
         let speed_squared = |u: &Vector<R>| u.iter().map(|x| (x.to_f64() / before).powi(2)).sum::<f64>();

@@ -50,7 +50,7 @@ impl Lengths {
     }
 }
 
-/// How a run goes on with steps of another length.
+/// Data to continue a run with steps of another length.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Clock {
     /// Time [s] from which whole steps are counted …
@@ -65,7 +65,7 @@ pub struct Clock {
 /// Whole steps of one length, cut where the limit asks for it.
 pub struct StepControl {
     step: f64,
-    /// From which time [s] and number they are counted.
+    /// Time [s] and number from which whole steps are counted.
     since: (f64, u64),
     /// The length [s] of the (sub)step before, where it was no part of such a step.
     before: Option<f64>,
@@ -80,13 +80,13 @@ impl StepControl {
         Self { step, since: (0.0, 0), before: None, monitor: None, substeps: 1 }
     }
 
-    /// How another control goes on from a state.
+    /// Returns the clock with which another control continues from a state.
     pub fn clock<R>(&self, state: &State<R>) -> Clock {
         let (since, steps) = self.since;
         Clock { since, steps, before: self.lengths(state).before }
     }
 
-    /// Goes on where another control, with steps of length `step` [s], has stood at a state. Steps of the
+    /// Continues from a state where another control, with steps of length `step` [s], has stood. Steps of the
     /// same length are counted on.
     pub fn go_on<R>(&mut self, clock: &Clock, step: f64, state: &State<R>) {
         self.since = if step == self.step { (clock.since, clock.steps) } else { (state.time, state.steps) };
@@ -141,13 +141,13 @@ impl StepControl {
         Lengths { before, next: part(self.substeps) }
     }
 
-    /// The time [s] over which relaxing laws come to the state's instant: what acts at the start came at
-    /// once, and where forces were found before, the laws are there.
+    /// Returns the time [s] over which relaxing laws come to the state's instant. It is zero at the start,
+    /// where loads came at once, and where forces were found before.
     pub fn relaxing<R: LaneNumber>(&self, state: &State<R>) -> f64 {
         if state.is_at_start() || state.evaluated { 0.0 } else { self.lengths(state).before }
     }
 
-    /// Whether a check of the limit is due: the first one, `CHECK_EVERY` steps after the last, or where the
+    /// True if a check of the limit is due: the first one, `CHECK_EVERY` steps after the last, or where the
     /// deformation differs.
     pub fn is_due<R>(&self, state: &State<R>, deformed: &Deformed) -> bool {
         let seen = &state.stability;
@@ -158,9 +158,9 @@ impl StepControl {
                         || deformed.differs(&seen.deformed, CHANGE)))
     }
 
-    /// Steps that pass over no check of the limit, at least one, if the deformation goes on to change as it
-    /// did within the last `steps` steps: half of those to the check that it asks for, so that a change that
-    /// grows faster is not missed either.
+    /// Returns the number of steps, at least one, that pass over no check of the limit. The deformation is
+    /// assumed to change as it did within the last `steps` steps. Only half of the steps to its next check
+    /// are counted, so that a faster change is not missed either.
     pub fn steps_to_check<R>(
         &self,
         state: &State<R>,
@@ -183,7 +183,7 @@ impl StepControl {
         self.look_with(model, owners, None, state, deformed);
     }
 
-    /// The same with what has found the forces of the state, which it still has afterwards.
+    /// Looks at the limit as [`look`](Self::look) does, with the `forces` of the state, which are kept.
     pub(crate) fn look_with<R: LaneNumber>(
         &mut self,
         model: &Model,

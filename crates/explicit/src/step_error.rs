@@ -1,4 +1,4 @@
-//! Why a step could not be taken, with place, time and remedy.
+//! Errors of a step that could not be taken, with place, time and remedy.
 
 use pliant_mechanics::model::Model;
 use pliant_mechanics::tensor::cast;
@@ -13,12 +13,12 @@ fn located(model: &Model, node: u32) -> (String, u32) {
     (model.bodies[body].name.clone(), node)
 }
 
-/// Where in an element, if it is a corner.
+/// Returns the place in an element as text, if it is a corner.
 pub(crate) fn at_corner(corner: bool, node: u32) -> String {
     if corner { format!(" at its corner at node {node}") } else { String::new() }
 }
 
-/// Why a step could not be taken.
+/// Reason why a step could not be taken.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum StepError {
     /// A displacement is not a number or infinite.
@@ -41,9 +41,9 @@ pub enum StepError {
         body: String,
         /// The element, numbered as in the user's mesh.
         element: u32,
-        /// Its first node, or that of the corner, numbered in its body.
+        /// First node of the element, or the node of the corner, numbered in its body.
         node: u32,
-        /// Whether it is a corner of a hexahedron, not its middle.
+        /// True if the inversion is at a corner of a hexahedron, not at its middle.
         corner: bool,
         /// det F there.
         determinant: f64,
@@ -60,7 +60,7 @@ pub enum StepError {
         body: String,
         /// The element that sets the limit, numbered as in the user's mesh.
         element: u32,
-        /// Its first node, numbered in its body.
+        /// First node of the element, numbered in its body.
         node: u32,
         /// The limit [s].
         limit: f64,
@@ -98,7 +98,7 @@ impl StepError {
         Self::Inverted { body, element: solid.original[cell], node, corner: false, determinant, time }
     }
 
-    /// Of a hexahedron with a corner turned inside out.
+    /// Makes the error of a hexahedron with a corner turned inside out.
     pub(crate) fn folded<R: LaneNumber>(
         model: &Model,
         (solid, cell): (usize, usize),
@@ -124,13 +124,13 @@ impl StepError {
         Self::BelowLimit { body, element: solid.original[look.cell], node, limit: look.limit, step, time }
     }
 
-    /// That the energies of a state are off balance, where a node is the fastest.
+    /// Makes the error of a state whose energies are off balance, with its fastest node.
     pub fn unbalanced(model: &Model, fastest: u32, balance: f64, time: f64) -> Self {
         let (body, node) = located(model, fastest);
         Self::Unbalanced { body, node, balance, time }
     }
 
-    /// What to try.
+    /// Returns advice on what to try.
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::NotFinite { .. } | Self::Unbalanced { .. } => {

@@ -1,16 +1,16 @@
-//! The central difference method in incremental form: with a = α Δt/2, Δuⁿ⁺¹ = ((1 − a) Δuⁿ + Δt²/m (R − f))
-//! / (1 + a), uⁿ⁺¹ = uⁿ + Δuⁿ⁺¹ (thesis 5.28–5.32 without the cancellation in 2uⁿ − uⁿ⁻¹). Damping does not
-//! lower the stable step. Where the step changes from Δt⁻ to Δt⁺, velocities go on: with h = (Δt⁻ + Δt⁺)/2
-//! and a = α h/2, Δuⁿ⁺¹ = ((1 − a) Δt⁺/Δt⁻ Δuⁿ + Δt⁺ h/m (R − f)) / (1 + a). With v⁻ = Δuⁿ/Δt⁻ and v⁺ =
-//! Δuⁿ⁺¹/Δt⁺, so that h a = v⁺ − v⁻, the work of all forces by the trapezoidal rule is ½ m a (Δt⁻ v⁻ + Δt⁺
-//! v⁺) = ½ m (v⁺² − v⁻²) + ⅛ (Δt⁺² − Δt⁻²) m a². So the change adds ⅛ (Δt⁻² − Δt⁺²) Σ m|a|² to the kinetic
-//! energy, which the book of energies enters beside the work. The velocity at the instant is v⁻ + ½ Δt⁻ a =
-//! v⁺ − ½ Δt⁺ a.
+//! The central difference method in incremental form. With a = α Δt/2 the increment is Δuⁿ⁺¹ = ((1 − a) Δuⁿ +
+//! Δt²/m (R − f)) / (1 + a), and uⁿ⁺¹ = uⁿ + Δuⁿ⁺¹. These are thesis 5.28–5.32 without the cancellation in
+//! 2uⁿ − uⁿ⁻¹. Damping does not lower the stable step. If the step changes from Δt⁻ to Δt⁺, velocities
+//! continue. Let h = (Δt⁻ + Δt⁺)/2 and a = α h/2. Then Δuⁿ⁺¹ = ((1 − a) Δt⁺/Δt⁻ Δuⁿ + Δt⁺ h/m (R − f)) / (1 +
+//! a). Let v⁻ = Δuⁿ/Δt⁻ and v⁺ = Δuⁿ⁺¹/Δt⁺, so that h a = v⁺ − v⁻ with the acceleration a. The trapezoidal
+//! rule gives the work of all forces, ½ m a (Δt⁻ v⁻ + Δt⁺ v⁺). It equals ½ m (v⁺² − v⁻²) + ⅛ (Δt⁺² − Δt⁻²) m
+//! a². So the change adds ⅛ (Δt⁻² − Δt⁺²) Σ m|a|² to the kinetic energy. The book of energies enters this
+//! energy besides the work. The velocity at the instant is v⁻ + ½ Δt⁻ a = v⁺ − ½ Δt⁺ a.
 //!
-//! A step has two halves: [`CentralDifference::evaluate`] finds forces, the coming increments, reactions and
-//! energies at the current time, so that all that an observer sees belongs to one instant;
-//! [`CentralDifference::advance`] moves. Runs on the current rayon pool; sums go in the order of the nodes
-//! for any number of threads.
+//! A step has two halves. [`CentralDifference::evaluate`] finds forces, the coming increments, reactions and
+//! energies at the current time. So all that an observer sees belongs to one instant.
+//! [`CentralDifference::advance`] moves the nodes. Steps run on the current rayon pool; sums follow the order
+//! of the nodes for any number of threads.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -51,11 +51,11 @@ const LEAST_CHUNKS: usize = 5;
 pub enum Wanted {
     /// Energies and reactions.
     Energies,
-    /// Also displacements, increments and what relaxing laws remember.
+    /// Energies, reactions, displacements, increments and the history of relaxing laws.
     Everything,
 }
 
-/// What can be asked about the instant a state stands at, of whatever brought it there.
+/// Results at the instant a state stands at, whatever brought it there.
 pub trait Observable<R> {
     /// Energies [J].
     fn energies(&self) -> &Energies;
@@ -96,22 +96,22 @@ pub trait Observable<R> {
     }
 }
 
-/// The number types of [`CentralDifference`], and what is compiled for them here and not again where a model
+/// Number type of [`CentralDifference`], with the functions compiled for it here and not again where a model
 /// is stepped.
 pub trait SteppedIn: LaneNumber {
-    /// As [`CentralDifference::new`].
+    /// Runs [`CentralDifference::new`].
     #[doc(hidden)]
     fn stepper(model: Arc<Model>, step: f64) -> Result<CentralDifference<Self>, Contradiction>;
 
-    /// As [`CentralDifference::evaluate`].
+    /// Runs [`CentralDifference::evaluate`].
     #[doc(hidden)]
     fn evaluate(stepper: &mut CentralDifference<Self>, state: &mut State<Self>) -> Result<(), StepError>;
 
-    /// As [`CentralDifference::advance`].
+    /// Runs [`CentralDifference::advance`].
     #[doc(hidden)]
     fn advance(stepper: &mut CentralDifference<Self>, state: &mut State<Self>);
 
-    /// As [`Observable::contact_nodes`].
+    /// Runs [`Observable::contact_nodes`].
     #[doc(hidden)]
     fn contact_nodes(stepper: &CentralDifference<Self>, state: &State<Self>) -> Vec<NodeContact>;
 }
@@ -165,7 +165,7 @@ pub struct CentralDifference<R> {
     collectives: Vec<Collective>,
     /// Contacts with rigid things.
     contact: Option<ContactSolver<R>>,
-    /// Whether the highest modes are dissipated.
+    /// True if the highest modes are dissipated.
     dissipates: bool,
     processor: Processor,
     /// Factors on the amplitudes of each constraint now and after the step.
@@ -179,7 +179,7 @@ pub struct CentralDifference<R> {
     balance_floor: f64,
 }
 
-/// At the last evaluation.
+/// Results at the last evaluation.
 impl<R: SteppedIn> Observable<R> for CentralDifference<R> {
     fn energies(&self) -> &Energies {
         &self.energies
@@ -316,7 +316,7 @@ impl<R: SteppedIn> CentralDifference<R> {
         self
     }
 
-    /// Whether internal forces of earlier instants damp.
+    /// True if internal forces of earlier instants damp.
     fn damps_by_forces(&self) -> bool {
         self.dissipates || self.model.stiffness_damping > 0.0
     }
@@ -332,8 +332,8 @@ impl<R: SteppedIn> CentralDifference<R> {
         self
     }
 
-    /// Says where coupled nodes of contacts ([`Contacts::coupled_nodes`]) go between two times [s], from one
-    /// place [m] to another, at the same speed, also beyond these times.
+    /// Leads the coupled nodes of contacts ([`Contacts::coupled_nodes`]) from one place [m] to another
+    /// between two times [s]. Their speed is constant, also beyond these times.
     ///
     /// # Panics
     /// If there are not as many ways as coupled nodes.
@@ -348,24 +348,23 @@ impl<R: SteppedIn> CentralDifference<R> {
         self.contact.as_ref().map_or(&[], ContactSolver::impulses)
     }
 
-    /// How another stepper goes on from a state of this one.
+    /// Returns the clock with which another stepper continues from a state of this one.
     pub fn clock(&self, state: &State<R>) -> Clock {
         self.control.clock(state)
     }
 
-    /// Goes on where another stepper, with steps of length `step` [s], has stood at a state: with the
+    /// Continues from a state where another stepper, with steps of length `step` [s], has stood, with the
     /// velocities there.
     pub fn go_on(&mut self, clock: &Clock, step: f64, state: &State<R>) {
         self.control.go_on(clock, step, state);
     }
 
-    /// Takes hold of points: these grips and no others act from the next evaluation on. Their work is
-    /// external.
+    /// Replaces the grips: only these act from the next evaluation on. Their work is external.
     pub fn grip(&mut self, grips: &[Grip]) {
         self.applied.grip(grips);
     }
 
-    /// Takes forces [N] from outside, one a node, or none: they and no others act from the next evaluation on
+    /// Replaces the forces [N] from outside, one per node, or none. They act from the next evaluation on
     /// until they are replaced. Their work is external.
     pub fn push(&mut self, forces: &[Vector<f64>]) {
         self.applied.push(forces);
@@ -386,12 +385,12 @@ impl<R: SteppedIn> CentralDifference<R> {
         self.control.step()
     }
 
-    /// Forces, coming increments, reactions and energies at the current time. Where they were found before,
-    /// also by another stepper, they are found again.
+    /// Finds forces, coming increments, reactions and energies at the current time. Forces that were found
+    /// before, also by another stepper, are found again.
     ///
     /// # Errors
-    /// If the state is not finite, a cell is inverted, the energies do not balance, or the step is above the
-    /// limit and must not be cut.
+    /// If the state is not finite, a cell is inverted, or the energies do not balance. Also if the step is
+    /// above the limit and must not be cut.
     pub fn evaluate(&mut self, state: &mut State<R>) -> Result<(), StepError> {
         R::evaluate(self, state)
     }
@@ -445,8 +444,8 @@ impl<R: SteppedIn> CentralDifference<R> {
         below
     }
 
-    /// Moves to the next instant, at the end of the step or of a part of it; [`evaluate`](Self::evaluate) has
-    /// gone before.
+    /// Moves to the next instant, at the end of the step or of its part. [`evaluate`](Self::evaluate) has to
+    /// run first.
     pub fn advance(&mut self, state: &mut State<R>) {
         R::advance(self, state);
     }
@@ -480,7 +479,7 @@ impl<R: SteppedIn> CentralDifference<R> {
         state.lags.iter_mut().for_each(|lag| lag.advance(state.time));
     }
 
-    /// Those of some nodes of which a component has an owner.
+    /// Returns the nodes of a range of which a component has an owner.
     #[inline(always)]
     fn held_in(&self, nodes: Range<usize>) -> &[Held] {
         let before = |end: usize| self.held.partition_point(|held| (held.node as usize) < end);
@@ -524,7 +523,7 @@ impl<R: SteppedIn> CentralDifference<R> {
         state.work.begin(kinetic, stored, shock);
     }
 
-    /// Where a node goes with the forces that are found.
+    /// Predicts the motion of a node from the forces found.
     fn predicted(&self, state: &State<R>, node: u32) -> Predicted {
         let at = node as usize;
         let [next, mean] = [self.lengths.next, self.lengths.mean()];

@@ -4,16 +4,16 @@
 pub(crate) const MOST_SUBSTEPS: u32 = 100;
 /// Substeps are chosen so that they reach this part of the limit at the most.
 pub(crate) const RESERVE: f64 = 0.95;
-/// They are kept up to this part: the limit may fall before the next check.
+/// Part of the limit up to which substeps are kept: the limit may fall before the next check.
 pub const KEEP: f64 = 0.97;
 /// Steps for which the limit has to allow fewer parts before they are used.
 pub(crate) const REJOIN_AFTER: u64 = 1000;
-/// How often the steps of a run are halved at most.
+/// Maximum number of times that the steps of a run are halved.
 pub const MOST_HALVINGS: u32 = 3;
 
-/// The parts into which a step is cut, from how many there are now and the limit; `None` if more than
-/// `MOST_SUBSTEPS` are needed. Fewer than now only where they keep the reserve, so that a limit that hovers
-/// at a number of parts does not make it change all the time.
+/// Returns the parts into which a step is cut, from the present number of parts and the limit; `None` if more
+/// than `MOST_SUBSTEPS` are needed. Fewer parts than now are used only if they keep the reserve. So a limit
+/// that hovers at a number of parts does not make this number change all the time.
 pub(crate) fn substeps(step: f64, limit: f64, now: u32) -> Option<u32> {
     let enough = (step / (RESERVE * limit)).ceil();
     if enough > f64::from(MOST_SUBSTEPS) || enough.is_nan() {
@@ -24,9 +24,9 @@ pub(crate) fn substeps(step: f64, limit: f64, now: u32) -> Option<u32> {
     Some(if stable { now.min(enough) } else { enough })
 }
 
-/// By which factor the limit may change before [`substeps`] chooses other parts than these, as a logarithm;
-/// zero where it asks for more now. Where it allows fewer already, only more count: fewer are not used at
-/// once.
+/// Returns the factor by which the limit may change before [`substeps`] chooses other parts, as a logarithm.
+/// It is zero if the limit asks for more parts now. If the limit allows fewer parts already, only a change to
+/// more counts: fewer are not used at once.
 pub(crate) fn margin(step: f64, limit: f64, parts: u32) -> f64 {
     let more = f64::from(parts) * KEEP * limit / step;
     // One part cannot become fewer.

@@ -1,9 +1,9 @@
-//! The stiffest modes of cells in a deformed state. With one evaluation point K_ab = V B_aᵀ A B_b, A = ∂P/∂F,
-//! and the eigenvalues of K other than zero are those of V Lᵀ A L, where L Lᵀ = G = Σ B_a⊗B_a: a 9×9 problem
-//! for any number of nodes. A comes from the law's stress by central differences, so that it is right for
-//! every law: nothing about stiffening is assumed. The instantaneous response bounds that of a relaxing law.
-//! A triangle of a membrane is taken in its own frame, where it has no gradient across: of the nine modes
-//! those have no stiffness. A pack of cells is taken at once, in lanes.
+//! The stiffest modes of cells in a deformed state. With one evaluation point K_ab = V B_aᵀ A B_b, A = ∂P/∂F.
+//! The eigenvalues of K other than zero are also the eigenvalues of V Lᵀ A L, where L Lᵀ = G = Σ B_a⊗B_a.
+//! This is a 9×9 problem for any number of nodes. A comes from the law's stress by central differences, so
+//! that it is right for every law: nothing about stiffening is assumed. The instantaneous response bounds the
+//! response of a relaxing law. A triangle of a membrane is taken in its own frame, where it has no gradient
+//! across: the modes across have no stiffness. A pack of cells is taken at once, in lanes.
 
 use std::array::from_fn;
 
@@ -26,21 +26,21 @@ pub(crate) fn gradient_square(gradient: &[Vector<f64>]) -> Symmetric<f64> {
     gradient.iter().fold(Symmetric::ZERO, |sum, &b| sum + Symmetric::dyad(b))
 }
 
-/// How stiff a cell is, per volume [Pa/m²].
+/// Stiffness of a cell per volume [Pa/m²].
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Stiffness {
     /// The largest eigenvalue of K/V, over all modes.
     pub mode: f64,
-    /// The largest over the modes n⊗y of plane waves. In a mesh it is they that neighbours share, while alone
-    /// a cell is often stiffest in a change of volume, all directions at once: compressed along one of them
-    /// it hardly changes.
+    /// The largest over the modes n⊗y of plane waves, which neighbours in a mesh share. A cell alone is often
+    /// stiffest in a change of volume, in all directions at once. Compression along one direction hardly
+    /// changes this stiffness.
     pub wave: f64,
     /// The factor on the stiffness of hourglass control.
     pub hourglass: f64,
 }
 
-/// How stiff some cells are, at most [`PACK`], each with its displacement gradient and its Σ B_a ⊗ B_a
-/// [1/m²]; entries beyond them mean nothing. Not a number where the law is not defined.
+/// Returns the stiffness of at most [`PACK`] cells, each with its displacement gradient and its Σ B_a ⊗ B_a
+/// [1/m²]. Entries beyond the cells mean nothing. The stiffness is not a number where the law is not defined.
 pub(crate) fn stiffness(
     solid: &Solid,
     cells: &[u32],
@@ -77,8 +77,8 @@ fn of_states(
     from_fn(|lane| Stiffness { mode: mode.0[lane], wave: wave.0[lane], hourglass: hourglass.0[lane] })
 }
 
-/// Of a bar, as if it were taut: E/(λ₀ L²) along it, or P/(λ L²) across, twice for its two nodes, with λ₀ the
-/// slack.
+/// Returns the stiffness of a bar, as if it were taut: E/(λ₀ L²) along the bar, or P/(λ L²) across, twice for
+/// its two nodes. Here λ₀ is the slack.
 fn of_bar(solid: &Solid, rest: &Rest<2>, cord: &Cord, h: &Tensor<f64>) -> Stiffness {
     let Pull { length, stress: [stress, _], .. } =
         cord.pull(rest, h.apply(rest.between()), solid.material.law.small_strain().young());
@@ -104,7 +104,7 @@ const ENTRIES: [[usize; 2]; 6] = [[0, 0], [1, 1], [2, 2], [0, 1], [1, 2], [0, 2]
 /// Turns of the search.
 const TURNS: usize = 4;
 
-/// A pack of cells, with what [`stiffness`] is given of them.
+/// Pack of cells, with the input of [`stiffness`] for each cell.
 struct Tangents<'a> {
     solid: &'a Solid,
     cells: &'a [usize; PACK],
@@ -136,7 +136,7 @@ impl LaneWork<f64> for Tangents<'_> {
         for at in (0..PACK).step_by(L::WIDTH) {
             let size = load_symmetric::<f64, L>(self.square, at).trace();
             let mut symmetric = [[L::ZERO; ROWS]; ROWS];
-            // What is no number stays none: maxima on the way may lose it.
+            // A value that is not a number stays so: maxima on the way may lose it.
             let mut sound = L::ZERO;
             for i in 0..ROWS {
                 for k in 0..ROWS {
@@ -238,8 +238,8 @@ fn plane_stresses(solid: &Solid, cells: &[usize; PACK], batch: &mut Batch<f64>) 
     }
 }
 
-/// max (n⊗y):A:(n⊗y) over unit n and y, by turns: for one of them kept, the other is an eigenvector of a 3×3
-/// matrix.
+/// Returns max (n⊗y):A:(n⊗y) over unit n and y, by turns. With one of the two kept, the other is an
+/// eigenvector of a 3×3 matrix.
 #[inline(always)]
 fn stiffest_wave<N: Number>(a: &Matrix<N>) -> N {
     let mut y = [N::ONE, N::ZERO, N::ZERO];

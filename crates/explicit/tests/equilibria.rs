@@ -83,7 +83,7 @@ fn hold() -> Curve {
     Curve { shape: Shape::Hold, from: 0.0, to: 1.0 }
 }
 
-/// The equilibrium after one second in so many load steps.
+/// Finds the equilibrium after one second in `steps` load steps.
 fn in_steps(cube: &Model, steps: u32) -> (DynamicRelaxation<f64>, State<f64>) {
     let mut solver = DynamicRelaxation::new(cube.clone(), RelaxationSettings::default()).unwrap();
     let mut state = State::at_rest(cube);
@@ -179,7 +179,7 @@ fn a_jump_relaxes_from_the_instantaneous_law_in_any_number_of_load_steps() {
     }
 }
 
-/// Of a ramp as long as the relaxation time, where the law gives way to the motion. The history takes
+/// Tests a ramp as long as the relaxation time, where the law gives way to the motion. The history takes
 /// stresses as linear in a load step, so that the error falls with its square.
 #[test]
 fn what_relaxing_laws_store_and_dissipate_hardly_depends_on_the_load_steps() {

@@ -1,8 +1,8 @@
 //! Errors and warnings about a scene: each has a message, its place in the user's own file, and a remedy.
 //!
-//! All mistakes of a file are collected; the first [`MOST_SHOWN`] are shown together. [`SceneErrors`] is what
-//! a command line prints: through miette's graphical handler with the lines underlined, or one mistake a line
-//! with [`SceneErrors::plain`]. Control codes of terminals are removed, and long lines and values are
+//! All mistakes of a file are collected; the first [`MOST_SHOWN`] are shown together. A command line prints
+//! [`SceneErrors`] through miette's graphical handler, which underlines the lines. [`SceneErrors::plain`]
+//! prints one mistake a line. Control codes of terminals are removed, and long lines and values are
 //! shortened.
 
 use std::borrow::Cow;
@@ -35,12 +35,12 @@ pub enum Severity {
     Warning,
 }
 
-/// Where a value of a scene was given.
+/// Place where a value of a scene was given.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
     /// In the scene file, these bytes of its text.
     File(Range<usize>),
-    /// As an option of the command with a meaning of its own, such as `--until`; there is no line to show.
+    /// In an option of the command with a meaning of its own, such as `--until`; there is no line to show.
     CommandLine,
     /// In an option of the command that is shown as it was typed: these bytes of its text.
     Option(Arc<str>, Range<usize>),
@@ -66,17 +66,17 @@ impl From<Range<usize>> for Place {
 pub struct Diagnostic {
     /// Error or warning.
     pub severity: Severity,
-    /// What is wrong, with which number; makes sense without the label.
+    /// Description of the mistake, with its number; makes sense without the label.
     pub message: String,
     /// The bytes to underline in the scene's text, or in `option`; none where there is no such place.
     pub span: Option<Range<usize>>,
     /// The option of the command that it is about, as typed; none for the scene's own text.
     pub option: Option<Arc<str>>,
-    /// What is written under the underlined text.
+    /// Note under the underlined text.
     pub label: String,
-    /// What to try.
+    /// Advice to the user.
     pub help: Option<String>,
-    /// Other places that have to do with it, each with its label.
+    /// Other places of the mistake, each with its label.
     pub also: Vec<(Range<usize>, String)>,
 }
 
@@ -150,7 +150,7 @@ impl Diagnostic {
         self
     }
 
-    /// Whether this keeps the scene from running.
+    /// True if this keeps the scene from running.
     pub fn is_error(&self) -> bool {
         self.severity == Severity::Error
     }
@@ -198,10 +198,10 @@ impl miette::Diagnostic for Diagnostic {
     }
 }
 
-/// All that was found about one scene, with the scene's text to show it in.
+/// Errors and warnings about one scene, with the scene's text to show them in.
 ///
-/// Its `Display` is the headline that miette's handlers print above the underlined lines: the message where
-/// there is one finding, their number where there are several. Logs want [`plain`](Self::plain).
+/// Its `Display` is the headline that miette's handlers print above the underlined lines. The headline is the
+/// message of a single finding, or the number of several findings. Logs use [`plain`](Self::plain).
 #[derive(Debug, Clone)]
 pub struct SceneErrors {
     source: NamedSource<Excerpts>,
@@ -260,7 +260,7 @@ impl SceneErrors {
         let text = visible(text);
         for diagnostic in &mut diagnostics {
             diagnostic.option = diagnostic.option.take().map(visible);
-            // A place outside the text would make miette show nothing of it.
+            // For a place outside the text miette would show nothing.
             let own = diagnostic.option.clone().unwrap_or_else(|| text.clone());
             diagnostic.span = diagnostic.span.take().map(|span| clamp(&own, span));
             diagnostic.message = shortened(std::mem::take(&mut diagnostic.message));
@@ -288,7 +288,7 @@ impl SceneErrors {
         &self.source.inner().0
     }
 
-    /// All errors and warnings in the order of the text; those without a place come last.
+    /// Errors and warnings in the order of the text; findings without a place come last.
     pub fn diagnostics(&self) -> &[Diagnostic] {
         &self.diagnostics
     }
@@ -303,22 +303,22 @@ impl SceneErrors {
         Some((before.matches('\n').count() + 1, before[line_start..].chars().count() + 1))
     }
 
-    /// For logs, one finding a line: `liver.toml:12:17: error: … (help: …)`.
+    /// Returns text for logs, one finding a line: `liver.toml:12:17: error: … (help: …)`.
     pub fn plain(&self) -> impl fmt::Display + '_ {
         Plain(self)
     }
 
-    /// Those that are shown.
+    /// Findings that are shown.
     fn shown(&self) -> &[Diagnostic] {
         &self.diagnostics[..self.diagnostics.len().min(MOST_SHOWN)]
     }
 
-    /// How many are not shown.
+    /// Number of findings that are not shown.
     fn hidden(&self) -> usize {
         self.diagnostics.len() - self.shown().len()
     }
 
-    /// The diagnostic that stands for the whole where there is just one.
+    /// Returns the diagnostic if there is only one.
     fn single(&self) -> Option<&Diagnostic> {
         match self.diagnostics.as_slice() {
             [diagnostic] => Some(diagnostic),
@@ -327,8 +327,8 @@ impl SceneErrors {
     }
 }
 
-/// The nearest span that lies in the text, on the borders of characters, not longer than what is underlined
-/// at most.
+/// The nearest span that lies in the text, on the borders of characters and is at most [`LONGEST_PLACE`]
+/// long.
 fn clamp(text: &str, span: Range<usize>) -> Range<usize> {
     let start = boundary_before(text, span.start);
     let end = boundary_after(text, span.end).max(start);

@@ -1,8 +1,8 @@
-//! Files of other programs that are neither a mesh nor a scene here: what they are, and what helps.
+//! Files of other programs that are neither a mesh nor a scene here: their kinds, and advice.
 
 use std::path::Path;
 
-/// Files by their ending: what they are, and what to do.
+/// Files by their ending: kind and advice.
 const BY_ENDING: [(&str, &str, &str); 9] = [
     ("inp", "an input deck of Abaqus or CalculiX", "`meshio convert model.inp model.vtu` makes a mesh of it"),
     ("bdf", "an input deck of Nastran", "`meshio convert model.bdf model.vtu` makes a mesh of it"),
@@ -15,7 +15,7 @@ const BY_ENDING: [(&str, &str, &str); 9] = [
     ("iges", "a CAD model without cells", "Gmsh makes a mesh of it: `gmsh -3 model.iges -o model.msh`"),
 ];
 
-/// Scenes in XML by a word of theirs.
+/// Scenes in XML by a word that they contain.
 const BY_WORD: [(&str, &str, &str); 3] = [
     ("<Model", "a model of NiftySim", "`pliant import MODEL.xml -o scene.toml` makes a scene of it"),
     (
@@ -30,7 +30,7 @@ const BY_WORD: [(&str, &str, &str); 3] = [
     ),
 ];
 
-/// What a file is and what to do, if its ending names the format of another program.
+/// Returns the kind of a file and advice, if its ending names the format of another program.
 ///
 /// ```
 /// let [what, help] = pliant_format::foreign_file("model.INP".as_ref()).unwrap();
@@ -43,7 +43,7 @@ pub fn foreign_file(path: &Path) -> Option<[&'static str; 2]> {
     own.map(|&(_, what, help)| [what, help])
 }
 
-/// The same of a text that is XML and not TOML.
+/// Returns the kind of a text and advice, if the text is XML and not TOML.
 pub(crate) fn foreign_text(text: &str) -> Option<[&'static str; 2]> {
     text.trim_start_matches('\u{feff}').trim_start().starts_with('<').then(|| {
         let own = BY_WORD.iter().find(|(word, ..)| text.contains(word));

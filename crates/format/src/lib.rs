@@ -1,5 +1,6 @@
-//! Scene files: a text is read into a [`Scene`], tables of plain data whose values keep their places in the
-//! file, and all messages about them. Knows no solver and no GPU; `pliant-scene` builds what a scene says.
+//! Scene files and all messages about them. A text is read into a [`Scene`]: tables of plain data whose
+//! values keep their places in the file. The crate knows no solver and no GPU; `pliant-scene` builds the
+//! model from a scene.
 //!
 //! ```
 //! use pliant_format::{Scene, source::Source};

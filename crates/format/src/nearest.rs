@@ -2,12 +2,12 @@
 
 /// The known name that `word` was most likely meant to be, if any is near.
 ///
-/// Near is a third of the letters added, left out, changed or swapped, or one name at the beginning of the
-/// other; case, `-`, `_` and spaces don't count.
+/// A name is near if it begins the other, or if at most a third of the letters are added, left out, changed
+/// or swapped. Case, `-`, `_` and spaces don't count.
 pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let plain = |name: &str| name.to_lowercase().replace(['_', ' '], "-");
     let word = plain(word);
-    // What the distance costs grows with the square of the length; no name is as long as this.
+    // The cost of the distance grows with the square of the length; no name is as long as this.
     if word.len() > 100 {
         return None;
     }
@@ -31,10 +31,10 @@ pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
     best.map(|(_, name)| name).or(beginning)
 }
 
-/// Whose names are meant, in suggestions.
+/// Owner of the names in suggestions.
 pub const SCENE: &str = "the scene";
 
-/// "did you mean …?" or a list of what there is; `owner` is `the scene` or another that has such names.
+/// "did you mean …?" or a list of the known names; `owner` is `the scene` or another that has such names.
 pub fn suggestion(word: &str, known: &[&str], owner: &str, what: &str) -> String {
     match nearest(word, known.iter().copied()) {
         Some(name) => format!("did you mean `{name}`?"),

@@ -1,5 +1,4 @@
-//! Which bodies of a scene go together: each participant as a scene of its own, with the tables that are
-//! about its bodies.
+//! Splits a scene into its participants: each becomes a scene of its own, with the tables about its bodies.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +12,7 @@ use crate::tables::{
 };
 
 impl ConstraintTable {
-    /// The body whose nodes it is about.
+    /// The body whose nodes the table concerns.
     pub fn body(&self) -> &str {
         match self {
             Self::Fix(table) => &table.body,
@@ -32,24 +31,24 @@ struct Owners {
     constraints: BTreeMap<String, usize>,
 }
 
-/// The group that a body goes with.
+/// Index of the group of a body.
 fn group_of<'g>(groups: &'g [(String, Vec<String>)], body: &String) -> Option<&'g (String, Vec<String>)> {
     groups.iter().find(|(_, bodies)| bodies.contains(body))
 }
 
-/// The tables of which something holds.
+/// The tables for which a condition holds.
 fn those<T: Clone>(tables: &[(String, T)], holds: impl Fn(&String, &T) -> bool) -> Vec<(String, T)> {
     tables.iter().filter(|(name, table)| holds(name, table)).cloned().collect()
 }
 
-/// Whether a body uses a law, in a layer or as a whole.
+/// True if a body uses a law, in a layer or as a whole.
 fn uses(bodies: &[(String, BodyTable)], law: &String) -> bool {
     let layered = |body: &BodyTable| body.layers.iter().any(|layer| layer.law.as_ref() == Some(law));
     bodies.iter().any(|(_, body)| body.law.values().contains(&law) || layered(body))
 }
 
-/// What a participant has of a scene. What belongs to none, as it is wrong, goes with the first one, to be
-/// reported once.
+/// Tables of a scene that belong to one participant. A table that is wrong and belongs to no participant goes
+/// to the first one, so that the mistake is reported once.
 struct Part<'s> {
     scene: &'s Scene,
     index: usize,
@@ -92,7 +91,8 @@ impl<'s> Part<'s> {
         !(self.contacts.is_empty() && self.meets.is_empty())
     }
 
-    /// Whether it shows a field: one of its bodies has it, or none of the scene.
+    /// True if this part writes a field: one of its bodies has the field. A field that no body of the scene
+    /// has goes to the first part.
     fn shows(&self, field: FieldName) -> bool {
         let Scene { bodies, contacts, .. } = self.scene;
         let can_be = |touches: bool| touches || !field.is_of_contact();
@@ -101,13 +101,13 @@ impl<'s> Part<'s> {
         has || (self.index == 0 && !is_known)
     }
 
-    /// The laws that its bodies use, or none of the scene.
+    /// The laws that its bodies use. A law that no body of the scene uses goes to the first part.
     fn laws(&self) -> Vec<(String, LawTable)> {
         let is_spare = |law: &String| self.index == 0 && !uses(&self.scene.bodies, law);
         those(&self.scene.laws, |law, _| uses(&self.bodies, law) || is_spare(law))
     }
 
-    /// The outputs of what it has.
+    /// The outputs of its bodies and surfaces.
     fn outputs(&self) -> Vec<(String, OutputTable)> {
         let mut outputs = self.scene.outputs.clone();
         outputs.retain_mut(|(_, output)| match output {
@@ -132,7 +132,7 @@ impl<'s> Part<'s> {
         outputs
     }
 
-    /// The view, as far as it is of what it has.
+    /// The view, reduced to its bodies and fields.
     fn view(&self) -> ViewTable {
         let mut view = self.scene.view.clone();
         let seen = view.on.as_deref().is_none_or(|on| self.owns(on));
@@ -149,11 +149,11 @@ impl<'s> Part<'s> {
 }
 
 impl Scene {
-    /// The participants with their names: the scene itself where all bodies go together.
+    /// Returns the participants with their names, or the scene itself if all bodies go together.
     ///
     /// # Errors
-    /// If a participant names a body that there is not, or that goes with another one, or none; or if a table
-    /// of a scene of several participants names a body or a surface that there is not.
+    /// If a participant names no body, a body that does not exist, or a body of another participant. If a
+    /// table of a scene of several participants names a body or a surface that does not exist.
     pub fn split(&self) -> Result<Vec<(String, Self)>, SceneErrors> {
         let mut out = Vec::new();
         let groups = self.groups(&mut out);
@@ -237,7 +237,7 @@ impl Scene {
         groups
     }
 
-    /// Refuses ties of bodies that there are not.
+    /// Reports ties of bodies that do not exist.
     fn check_ties(&self, known: &[&str], out: &mut Vec<Diagnostic>) {
         for (name, table) in &self.ties {
             for (index, body) in table.between.iter().enumerate() {
@@ -251,7 +251,7 @@ impl Scene {
         }
     }
 
-    /// Refuses walls on bodies of other participants: their common nodes have one solver.
+    /// Reports walls on bodies of other participants: their common nodes have one solver.
     fn check_walls(&self, groups: &[(String, Vec<String>)], out: &mut Vec<Diagnostic>) {
         for (name, table) in &self.bodies {
             let Some(host) = &table.on else { continue };
@@ -385,8 +385,8 @@ impl Scene {
         }
     }
 
-    /// The run of a participant: its own keys, and those of `[run]` that mean something for its bodies and
-    /// its solver.
+    /// The run of a participant: its own keys, and the keys of `[run]` that apply to its bodies and its
+    /// solver.
     fn run_of(&self, table: Option<&ParticipantTable>, models: &[BodyModel]) -> RunTable {
         let solver = table.and_then(|table| table.solver).unwrap_or(self.run.solver);
         let total_lagrangian = !models.contains(&BodyModel::Shell) && !solver.solves_equations();
@@ -419,7 +419,7 @@ impl Scene {
         }
     }
 
-    /// Whether the run of this scene, or of this participant, has a key of its own.
+    /// True if the run of this scene, or of this participant, has a key of its own.
     pub fn gives(&self, key: &str) -> bool {
         match &self.own {
             Some(own) => self.source.node(&["participant", own, key]).is_some(),
@@ -427,7 +427,7 @@ impl Scene {
         }
     }
 
-    /// Where a key of the run stands: in the table of the participant if it is given there, else in `[run]`.
+    /// Path of a key of the run: in the table of the participant if it is given there, else in `[run]`.
     pub fn run_at<'k>(&'k self, key: &'k str) -> Vec<&'k str> {
         if let Some(own) = &self.own {
             let path = vec!["participant", own.as_str(), key];
@@ -438,13 +438,13 @@ impl Scene {
         vec!["run", key]
     }
 
-    /// Whether its bodies go with the implicit solvers' model: shells, and solids whose equations are solved.
+    /// True if its bodies use the implicit solvers' model: shells, and solids whose equations are solved.
     pub fn is_implicit(&self) -> bool {
         self.run.solver.solves_equations()
             || self.bodies.iter().any(|(_, body)| body.model == BodyModel::Shell)
     }
 
-    /// Whether a body or a surface of it has a name.
+    /// True if one of its bodies or surfaces has this name.
     pub fn has(&self, name: &str) -> bool {
         self.bodies.iter().any(|(own, _)| own == name) || self.surfaces.iter().any(|(own, _)| own == name)
     }

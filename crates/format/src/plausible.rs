@@ -1,20 +1,20 @@
-//! Which values a quantity can have and is likely to have, by its unit. Unlikely values are doubts;
-//! properties beyond all sense, which have to be positive, are mistakes.
+//! Possible and likely values of a quantity, by its unit. An unlikely value gives a warning. An impossible
+//! value of a property that has to be positive is a mistake.
 
 use std::ops::RangeInclusive;
 
-/// What is known of a unit.
+/// Likely and possible values in a unit.
 pub(crate) struct Quantity {
     unit: &'static str,
     /// Values that tissue, tools and scenes have.
     likely: RangeInclusive<f64>,
     /// Values that can be computed with.
     possible: RangeInclusive<f64>,
-    /// What a value in another unit would have to be multiplied by.
+    /// Factors from other units.
     units: &'static str,
 }
 
-/// Sizes of values. Those of positions are not among them: a box may well reach to 1e9 m.
+/// Sizes of values. Positions are not checked: a box may well reach to 1e9 m.
 const QUANTITIES: [Quantity; 9] = [
     Quantity {
         unit: "Pa",
@@ -37,17 +37,17 @@ const QUANTITIES: [Quantity; 9] = [
     Quantity { unit: "1/s", likely: 1e-9..=1e7, possible: 1e-20..=1e15, units: "1/ms is 1000 1/s" },
 ];
 
-/// What is to say about a value.
+/// Remark about a value.
 pub(crate) struct Remark {
     pub is_mistake: bool,
-    /// What follows the name of the value.
+    /// Text that follows the name of the value.
     pub message: String,
     pub label: &'static str,
     pub help: String,
 }
 
-/// What is to say about a value in a unit; nothing where it is likely. A value that need not be `positive`,
-/// such as a load, may be as small as it likes, and a size beyond all sense is no mistake.
+/// Returns a remark about a value in a unit; `None` if it is likely. A value that need not be `positive`,
+/// such as a load, may be arbitrarily small, and an impossible size of it is no mistake.
 pub(crate) fn remark(value: f64, unit: &str, positive: bool, shown: &str) -> Option<Remark> {
     let quantity = QUANTITIES.iter().find(|quantity| quantity.unit == unit)?;
     let outside = |range: &RangeInclusive<f64>| {

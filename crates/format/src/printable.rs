@@ -1,20 +1,20 @@
-//! Text from files and names as it may go to a terminal or a page: without codes that a terminal obeys, and
-//! cut where it would flood.
+//! Makes text from files and names safe for a terminal or a page: codes that a terminal obeys are replaced,
+//! long texts are cut.
 
 use std::borrow::Cow;
 
 /// Bytes of a value that a message shows.
 const LONGEST: usize = 2000;
 
-/// What a terminal would obey or an editor would reorder by: control codes but line ends and tabs, and the
-/// marks that turn the direction of writing.
+/// True for control codes that a terminal obeys, except line ends and tabs, and for marks that change the
+/// direction of writing.
 fn commands(c: char) -> bool {
     (c.is_control() && !matches!(c, '\n' | '\r' | '\t'))
         || matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
-/// The same text with every code that a terminal obeys replaced by a visible character of the same length in
-/// UTF-8, so that places in the text stay where they are.
+/// Replaces every code that a terminal obeys by a visible character of the same length in UTF-8, so that
+/// places in the text stay valid.
 ///
 /// ```
 /// use pliant_format::printable;
@@ -43,8 +43,8 @@ pub(crate) fn boundary_after(text: &str, at: usize) -> usize {
     (at..=text.len()).find(|&at| text.is_char_boundary(at)).unwrap_or(text.len())
 }
 
-/// The text without codes that a terminal obeys, and where it is longer than a message should be, its
-/// beginning and how much follows.
+/// Returns the text without codes that a terminal obeys. A text that is too long for a message is cut, with
+/// the number of bytes that follow.
 pub(crate) fn shortened(mut text: String) -> String {
     if let Cow::Owned(visible) = printable(&text) {
         text = visible;

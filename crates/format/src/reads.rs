@@ -10,19 +10,19 @@ pub(crate) const LONGEST_SCENE: u64 = 1 << 26;
 /// Longest table and XML model [bytes].
 pub const LONGEST_TABLE: u64 = 1 << 30;
 
-/// Which files may be read.
+/// Files that may be read.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Reads {
     within: Option<PathBuf>,
 }
 
 impl Reads {
-    /// Any file that this user can read.
+    /// Allows any file that this user can read.
     pub fn anywhere() -> Self {
         Self::default()
     }
 
-    /// Files in a folder and in folders in it. Links are resolved before: where they lead counts.
+    /// Allows files in a folder and in its subfolders. Links are resolved first: their targets count.
     ///
     /// # Errors
     /// If there is no such folder.
@@ -39,7 +39,7 @@ impl Reads {
     /// The path by which a file may be read, links resolved where it matters.
     ///
     /// # Errors
-    /// If it may not, or is not there.
+    /// If the file may not be read or does not exist.
     pub fn allow(&self, path: &Path) -> io::Result<PathBuf> {
         let Some(folder) = &self.within else { return Ok(path.to_owned()) };
         let found = path.canonicalize()?;
@@ -57,7 +57,7 @@ impl Reads {
     /// The bytes of a file that may be read.
     ///
     /// # Errors
-    /// If it may not be read, is no regular file or is longer than `longest` bytes.
+    /// If the file may not be read, is no regular file or is longer than `longest` bytes.
     pub fn read(&self, path: &Path, longest: u64) -> io::Result<Vec<u8>> {
         read_limited(&self.allow(path)?, longest)
     }
@@ -68,7 +68,7 @@ pub fn table(path: &Path) -> io::Result<String> {
     String::from_utf8(read_limited(path, LONGEST_TABLE)?).map_err(io::Error::other)
 }
 
-/// The rows of a table with the numbers of their lines. Empty lines and what follows a # are passed over.
+/// The rows of a table with the numbers of their lines. Empty lines and comments after a # are skipped.
 pub fn rows_of(text: &str) -> impl Iterator<Item = (&str, usize)> {
     let lines = text.strip_prefix('\u{feff}').unwrap_or(text).lines().zip(1..);
     let rows = lines.map(|(line, number)| (line.split('#').next().unwrap_or("").trim(), number));

@@ -9,31 +9,31 @@ use crate::registry::Section;
 /// Tables within tables are described down to this depth.
 const DEEPEST: usize = 4;
 
-/// What the reference says of one parameter.
+/// Entry of the reference for one parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameter {
     /// Its key in the table.
     pub key: String,
-    /// What it takes, in words: `a number`, `3 numbers`, `one of "cpu", "gpu"`.
+    /// Kind of its value in words: `a number`, `3 numbers`, `one of "cpu", "gpu"`.
     pub kind: String,
     /// Its unit, such as `Pa`; empty without one.
     pub unit: String,
-    /// Whether the table must have it. One of several keys of which a table must have exactly one is not
+    /// True if the table must have it. If a table must have exactly one of several keys, none counts as
     /// required.
     pub required: bool,
-    /// What it is where the table lacks it, if it is anything.
+    /// Default value, if there is one.
     pub default: Option<Json>,
     /// The range of a number in words, `greater than 0`; empty without one.
     pub range: String,
     /// Its doc comment, all paragraphs.
     pub description: String,
-    /// The name of the definition that its value (or an item of it) is of; empty for none.
+    /// Name of the definition of its value, or of the items of its value; empty without one.
     pub table: String,
-    /// The parameters of the table, or of each of the tables, that it is.
+    /// The parameters of the table, or of each of the tables, that its value is.
     pub parts: Vec<Parameter>,
 }
 
-/// The page of all tables of a scene, as Markdown. Kinds of values that several tables take, or that hold
+/// The page of all tables of a scene, as Markdown. Kinds of values that several tables take, or that contain
 /// themselves, have a section of their own at the end.
 pub fn page(sections: &[Section]) -> String {
     let mut page = String::from(
@@ -152,7 +152,7 @@ fn python_class(name: &str, section: &Section, doc: &str, parameters: &[Paramete
     if !parameters.is_empty() {
         page.push('\n');
     }
-    // Those without a default come first, as in any signature.
+    // Parameters without a default come first, as in any signature.
     for parameter in
         parameters.iter().filter(|own| own.required).chain(parameters.iter().filter(|own| !own.required))
     {
@@ -185,7 +185,7 @@ fn definition<'s>(sections: &'s [Section], name: &str) -> &'s str {
     sections.iter().find_map(find).unwrap_or_default()
 }
 
-/// The name of the definition that a value, or an item of an array of them, is of; empty for none.
+/// Returns the name of the definition of a value, or of the items of an array; empty without one.
 fn definition_name(schema: &Json) -> &str {
     if let Some(name) = schema.get("$ref").and_then(Json::as_str) {
         return name.rsplit('/').next().unwrap_or_default();
@@ -207,13 +207,13 @@ fn describe_forms(schemas: Forms<'_>, forms: &[Form<'_>], depth: usize) -> Vec<P
     let mut parameters: Vec<Parameter> = Vec::new();
     let common = |key: &str| forms.len() > 1 && forms.iter().all(|form| form.property(key).is_some());
     for form in forms {
-        // The description of one of several tables goes to the key that tells it from the others.
+        // The description of one of several tables goes to the key that only this table has.
         let own = form.properties.iter().filter(|(key, _)| !common(key)).count();
         for (key, schema) in &form.properties {
             let of_all = forms.iter().all(|form| form.required.contains(key));
             if parameters.iter().all(|known| known.key != *key) {
                 let mut found = parameter(schemas, key, schema, of_all, depth);
-                // The form says more of the value than its type does.
+                // The form describes the value better than its type does.
                 let said = schema.get("description").is_some();
                 if let Some(doc) = form.doc.filter(|_| !said && own == 1 && !common(key)) {
                     found.description = doc.to_owned();
@@ -273,7 +273,7 @@ fn word(form: &Form<'_>) -> Option<Parameter> {
     })
 }
 
-/// A Markdown table of parameters; those within tables follow theirs as `fibre.cell-data`.
+/// A Markdown table of parameters; parameters within a table follow the table's, as `fibre.cell-data`.
 pub fn markdown(parameters: &[Parameter]) -> String {
     table(parameters, &[])
 }
@@ -340,7 +340,7 @@ mod tests {
         gravity: Option<[f64; 3]>,
         /// Relaxation.
         prony: Vec<Term>,
-        /// Where it runs.
+        /// Device of the run.
         #[serde(default)]
         device: Device,
     }

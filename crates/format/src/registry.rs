@@ -1,5 +1,5 @@
-//! The one place where a `type` of a scene file meets a parameter struct. Laws have their own registry beside
-//! the laws, in `pliant_mechanics::law`.
+//! The one place where a `type` of a scene file meets a parameter struct. Laws have their own registry in
+//! `pliant_mechanics::law`.
 
 use std::collections::BTreeMap;
 
@@ -22,7 +22,7 @@ use crate::tables::{
 pub(crate) trait Typed: Sized {
     /// The words for `type`.
     const NAMES: &'static [&'static str];
-    /// What the table is, in messages: `constraint`, `load`, `output`.
+    /// Word for the table in messages: `constraint`, `load`, `output`.
     const WHAT: &'static str;
 
     /// The schema of a type's parameters.
@@ -90,7 +90,7 @@ typed! {
     "csv" => Csv(CsvTable),
 }
 
-/// The word of a table's `type`, if it is one of the known; else a diagnostic.
+/// The word of a table's `type`, if it is known; else a diagnostic.
 fn type_of<'s>(
     source: &'s Source,
     path: &[&str],
@@ -285,7 +285,7 @@ impl LoadTable {
         }
     }
 
-    /// What it acts on; `None`: everything.
+    /// Body or surface on which it acts; `None`: everything.
     pub fn on(&self) -> Option<&str> {
         Some(match self {
             Self::Force(load) => &load.on,
@@ -332,10 +332,10 @@ mod tests {
         all::<OutputTable>();
     }
 
-    /// Lines of TOML between backticks in the descriptions of a schema: how many there are, and those that
-    /// the checker refuses.
+    /// Lines of TOML between backticks in the descriptions of a schema: their number, and the lines that the
+    /// checker refuses.
     fn lines_refused(scene: &Json) -> (usize, Vec<String>) {
-        /// All schemas with the names of their keys, and those around each, the innermost first.
+        /// Visits each schema, with the chain of the schemas around it, the innermost first.
         fn visit<'s>(schema: &'s Json, around: &[&'s Json], seen: &mut dyn FnMut(&[&'s Json])) {
             let chain: Vec<&Json> = std::iter::once(schema).chain(around.iter().copied()).collect();
             match schema {
@@ -350,7 +350,7 @@ mod tests {
         const TELLING: [&str; 6] = ["type", "$ref", "oneOf", "anyOf", "enum", "const"];
         let takes = |schema: &Json, node: &Node| {
             let Json::Object(own) = schema else { return false };
-            // Tables of schemas are none themselves.
+            // A table of schemas is not a schema itself.
             if !TELLING.iter().any(|key| own.get(*key).is_some_and(|told| !told.is_object())) {
                 return false;
             }

@@ -1,4 +1,4 @@
-//! A scene as read: its tables as plain data, each checked on its own, with the places they stand at.
+//! A scene as read: its tables as plain data, each checked on its own, with their places in the file.
 //! References between tables and everything that needs a mesh are checked when the model is built.
 
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ use crate::tables::{
     ToolTable, ViewTable,
 };
 
-/// A scene file and what it says.
+/// A scene file and its tables.
 #[derive(Clone, Debug)]
 pub struct Scene {
     /// The text and the places in it.
@@ -25,8 +25,8 @@ pub struct Scene {
     pub scene: SceneTable,
     /// `[run]`
     pub run: RunTable,
-    /// `[participant.NAME]`, in the order of the file, as all below but bodies, obstacles, tools and
-    /// contacts: these are in the order of their names, with walls after the other bodies.
+    /// `[participant.NAME]`, in the order of the file, as most tables below. Bodies, obstacles, tools and
+    /// contacts are in the order of their names, with walls after the other bodies.
     pub participants: Vec<(String, ParticipantTable)>,
     /// `[law.NAME]`
     pub laws: Vec<(String, LawTable)>,
@@ -34,7 +34,7 @@ pub struct Scene {
     pub bodies: Vec<(String, BodyTable)>,
     /// `[tie.NAME]`
     pub ties: Vec<(String, TieTable)>,
-    /// Bodies that ties to other participants hold.
+    /// Bodies that are tied to other participants.
     pub tied_outside: Vec<String>,
     /// `[surface.NAME]`
     pub surfaces: Vec<(String, SurfaceTable)>,
@@ -48,17 +48,17 @@ pub struct Scene {
     pub tools: Vec<(String, ToolTable)>,
     /// `[contact.NAME]`
     pub contacts: Vec<(String, ContactTable)>,
-    /// Those between a body of this scene and one of another participant.
+    /// Contacts between a body of this scene and a body of another participant.
     pub meets: Vec<(String, ContactTable)>,
     /// `[output.NAME]`
     pub outputs: Vec<(String, OutputTable)>,
     /// `[view]`
     pub view: ViewTable,
-    /// Doubts about values by themselves.
+    /// Warnings about single values.
     pub doubts: Vec<Diagnostic>,
-    /// Of the scene of one participant: the table that its run comes from.
+    /// Name of the participant's table that the run comes from, in the scene of one participant.
     pub own: Option<String>,
-    /// Whether it is the scene of one participant of several.
+    /// True if it is the scene of one participant of several.
     pub is_part: bool,
 }
 
@@ -80,7 +80,7 @@ const TABLES: [&str; 14] = [
     "view",
 ];
 
-/// Why a scene could not be read.
+/// Reason why a scene could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// The file can't be opened.
@@ -88,7 +88,7 @@ pub enum ReadError {
     File {
         /// Its path.
         path: PathBuf,
-        /// What the system says.
+        /// Message of the system.
         reason: String,
     },
     /// The file has mistakes.
@@ -109,7 +109,8 @@ pub fn open(path: &Path) -> Result<(Source, PathBuf), ReadError> {
     open_within(path, Reads::anywhere())
 }
 
-/// As [`open`], with the files that may be read: the scene file itself, and all that it names.
+/// Reads a scene file like [`open`], with the files that may be read: the scene file itself and all files
+/// that it names.
 ///
 /// # Errors
 /// If the file can't or may not be read, or is not TOML.
@@ -134,7 +135,7 @@ impl Scene {
     /// Reads a scene from its text; file names in it are relative to `folder`.
     ///
     /// # Errors
-    /// All mistakes of all tables together.
+    /// Reports all mistakes of all tables together.
     pub fn from_source(source: Source, folder: PathBuf) -> Result<Self, SceneErrors> {
         let mut out = Vec::new();
         check_top(&source, &mut out);
@@ -227,7 +228,7 @@ fn check_top(source: &Source, out: &mut Vec<Diagnostic>) {
     }
 }
 
-/// Reads `[scene]`, which no scene can do without.
+/// Reads `[scene]`, which every scene must have.
 fn read_scene_table(source: &Source, out: &mut Vec<Diagnostic>) -> Option<SceneTable> {
     if source.node(&["scene"]).is_none() {
         let help = "add `[scene]` with `until = 1.0`, the simulated time in seconds";
@@ -272,13 +273,14 @@ fn read_all<T>(
     all
 }
 
-/// Tables in the order of their names: the order of what touches in the file changes no digit.
+/// Sorts tables by their names, so that the order of bodies and contacts in the file changes no digit.
 fn by_name<T>(mut tables: Vec<(String, T)>) -> Vec<(String, T)> {
     tables.sort_by(|(a, _), (b, _)| a.cmp(b));
     tables
 }
 
-/// Files and columns are called after names: whether this is a plain word; a diagnostic if not.
+/// Checks that a name is a plain word, since files and columns are called after names; adds a diagnostic if
+/// not.
 fn check_name(of: &str, name: &str, node: &Node, out: &mut Vec<Diagnostic>) -> bool {
     let plain = !name.is_empty() && name.chars().all(|c| c.is_alphanumeric() || c == '-' || c == '_');
     if !plain {

@@ -1,4 +1,4 @@
-//! What a scene shows, as its table `[view]` asks, and what its tables sample.
+//! Outputs for the pictures of a scene, by its table `[view]`, and for its sampled series.
 
 use std::collections::BTreeMap;
 
@@ -7,12 +7,12 @@ use crate::scene::Scene;
 use crate::tables::{At, BodyModel, ColourBy, CsvTable, FieldName, ViewTable, VtuTable};
 
 impl Scene {
-    /// The field that colours tell; `None` for the colours of labels and that of tissue.
+    /// Field that the colours show; `None` for the colours of labels and the colour of tissue.
     pub fn shown_field(&self) -> Option<FieldName> {
         self.field_of(&self.view)
     }
 
-    /// The same of another view than its own.
+    /// Field that the colours of another view show.
     pub fn field_of(&self, view: &ViewTable) -> Option<FieldName> {
         match view.colour {
             Some(ColourBy::Field(field)) => Some(field),
@@ -22,8 +22,8 @@ impl Scene {
         }
     }
 
-    /// Whether its axes are those of a patient (x to the right, y to the front, z to the head): all bodies
-    /// are meshed from images.
+    /// True if its axes are a patient's axes (x to the right, y to the front, z to the head). This holds if
+    /// all bodies are meshed from images.
     pub fn is_of_patient(&self) -> bool {
         let meshes = self.bodies.iter().filter(|(_, body)| body.on.is_none()).map(|(_, body)| &body.mesh);
         let mut images = meshes.map(|mesh| mesh.image.is_some() || mesh.masks.is_some()).peekable();
@@ -37,7 +37,7 @@ impl Scene {
         Some((name, body.model))
     }
 
-    /// The fields that colours can tell on a body or a carried surface, or on all bodies together.
+    /// Fields that colours can show on a body or a carried surface, or on all bodies together.
     pub fn fields_on(&self, on: Option<&str>) -> Vec<FieldName> {
         let all = FieldName::ALL.into_iter();
         match self.carrier(on) {
@@ -51,7 +51,8 @@ impl Scene {
         }
     }
 
-    /// What a section shows of a view: the body in place of a surface that it carries, which has no inside.
+    /// Returns the view for a section: a carried surface, which has no inside, is replaced by the body that
+    /// carries it.
     pub fn in_section(&self, view: &ViewTable) -> ViewTable {
         let carrier = self.carrier(view.on.as_deref()).filter(|(_, model)| *model != BodyModel::Shell);
         let on = carrier.map(|(body, _)| body.clone()).or_else(|| view.on.clone());
@@ -66,8 +67,8 @@ impl Scene {
         view.on.as_ref().is_some_and(|on| self.surfaces.iter().any(|(name, _)| name == on))
     }
 
-    /// All that tables of the scene sample, in one: energies, all reactions, and the probes, under the name
-    /// of their table too where another one has a probe of that name.
+    /// Returns one table with all samples of the scene's tables: energies, all reactions, and the probes. If
+    /// two tables have a probe of the same name, the later one gets the name of its table in front.
     pub fn sampled(&self) -> CsvTable {
         let mut probes = BTreeMap::new();
         for (name, output) in &self.outputs {
@@ -80,7 +81,7 @@ impl Scene {
         CsvTable { every: 1.0, reactions: None, moments_about: None, energy: true, probes }
     }
 
-    /// A series of what is shown, with displacements and the field of the colours.
+    /// Series of the frames of the scene's view, with displacements and the field of the colours.
     pub fn shown(&self, every: f64) -> VtuTable {
         match self.view.clip {
             Some(_) => self.shown_as(&self.in_section(&self.view), every),
@@ -88,8 +89,8 @@ impl Scene {
         }
     }
 
-    /// A series of constraints and loads, where the view marks them: those of the body that carries a surface
-    /// which is shown.
+    /// Series of constraints and loads, if the view marks them. For a carried surface, it is about the body
+    /// that carries the surface.
     pub fn shown_marks(&self, every: f64) -> Option<VtuTable> {
         let data = vec![FieldName::Displacement, FieldName::Constraint, FieldName::Load, FieldName::Weight];
         let on = self.carrier(self.view.on.as_deref()).map(|(body, _)| body.clone());
@@ -97,7 +98,7 @@ impl Scene {
         self.view.marks.then_some(VtuTable { on, every, data, at: At::Points, curved: None })
     }
 
-    /// The same of another view than its own.
+    /// Series of the frames of another view.
     pub fn shown_as(&self, view: &ViewTable, every: f64) -> VtuTable {
         let mut data = vec![FieldName::Displacement];
         data.extend(self.field_of(view).filter(|field| *field != FieldName::Displacement));
@@ -115,7 +116,7 @@ impl Scene {
         let mut models = self.bodies.iter().filter(|(name, _)| on.is_none_or(|on| on == name));
         let shells = !self.shows_surface(view) && models.all(|(_, body)| body.model == BodyModel::Shell);
         let curved = (shells && view.curved > 1 && !view.critical).then_some(view.curved);
-        // Which cell is critical, and which way its fibres go, only the cells tell.
+        // The critical cell and the fibre directions are fields of cells.
         let cells = curved.is_some() || view.critical || view.fibres;
         let at = if cells && !self.shows_surface(view) { At::Cells } else { At::Points };
         VtuTable { on: on.cloned(), every, data, at, curved }

@@ -1,8 +1,7 @@
-//! The text of a scene with the place of every key and value in it, so that a mistake is shown where it was
-//! made.
+//! The text of a scene with the place of every key and value, so that each mistake is shown at its place.
 //!
-//! TOML is read with the `toml` crate's spanned tree; the tree here owns its text, keeps the order of the
-//! file and takes values from the command line, which have no place in the file.
+//! TOML is read with the `toml` crate's spanned tree. The tree here owns its text and keeps the order of the
+//! file. It also takes values from the command line, which have no place in the file.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -18,7 +17,7 @@ use crate::foreign::foreign_text;
 use crate::nearest::nearest;
 use crate::reads::Reads;
 
-/// Syntax errors shown of one file: what follows the first is often a consequence of it.
+/// Most syntax errors shown of one file: later errors are often consequences of the first.
 const MOST_SYNTAX_ERRORS: usize = 5;
 /// The end of the message about a key that stands twice in the file.
 const GIVEN_TWICE: &str = "is given twice";
@@ -37,13 +36,13 @@ pub struct Source {
 /// Meshes and images of the program that reads a scene, by the names that its tables call them.
 #[derive(Clone, Debug, Default)]
 pub struct Given {
-    /// Of bodies: `mesh = { given = "NAME" }`.
+    /// Meshes of bodies: `mesh = { given = "NAME" }`.
     pub meshes: BTreeMap<String, Arc<Mesh>>,
     /// In place of the file of this name wherever a scene names an image: `image = "NAME"`.
     pub images: BTreeMap<String, Arc<Image>>,
 }
 
-/// What the user types before an assignment.
+/// Option that the user types before an assignment.
 pub const SET: &str = "--set ";
 
 /// Kinds of tables that hold tables with names of the user's choice.
@@ -52,10 +51,10 @@ const NAMED: [&str; 8] = ["participant", "law", "body", "tie", "surface", "const
 /// A value and where it was given.
 #[derive(Clone, Debug)]
 pub struct Node {
-    /// Where the value stands: its own text, or the header `[law.liver]` of a table that has one.
+    /// Place of the value: its own text, or the header `[law.liver]` of a table that has one.
     pub place: Place,
-    /// Where its key stands, in the same text as the value; none for items of arrays, the root and what an
-    /// option with a meaning of its own gave.
+    /// Place of its key, in the same text as the value. `None` for items of arrays, the root, and values from
+    /// an option with a meaning of its own.
     pub key_span: Option<Range<usize>>,
     /// The value.
     pub value: Value,
@@ -111,7 +110,7 @@ impl From<String> for Value {
 }
 
 impl Node {
-    /// A value of the command line.
+    /// Makes a value of the command line.
     fn of_command_line(value: Value) -> Self {
         let value = match value {
             Value::Table(entries) => Value::Table(
@@ -185,7 +184,7 @@ impl Node {
         }
     }
 
-    /// Where the key stands, or the value where it has no key.
+    /// Place of the key, or of the value if it has no key.
     pub(crate) fn key_place(&self) -> Place {
         match &self.key_span {
             Some(span) => match &self.place {
@@ -237,12 +236,12 @@ impl Source {
         }
     }
 
-    /// The same, for a scene that may read these files only.
+    /// Restricts the files that the scene may read.
     pub fn reading(self, reads: Reads) -> Self {
         Self { reads, ..self }
     }
 
-    /// The same, with meshes and images of the program that reads it.
+    /// Sets the meshes and images that the calling program gives.
     pub fn giving(self, given: Given) -> Self {
         Self { given, ..self }
     }
@@ -277,8 +276,8 @@ impl Source {
         path.iter().try_fold(&self.root, |node, key| node.get(key))
     }
 
-    /// The keys, joined by points, of the smallest value or table header whose text, or whose key, has the
-    /// byte at a place; `None` where there is none.
+    /// Returns the path, joined by points, of the smallest value or table header whose text or key contains a
+    /// byte; `None` if there is no such value.
     pub fn key_at(&self, byte: usize) -> Option<String> {
         fn smallest(node: &Node, path: &str, byte: usize, found: &mut Option<(usize, String)>) {
             let own = if let Place::File(span) = &node.place { Some(span) } else { None };
@@ -302,8 +301,8 @@ impl Source {
         found.map(|(_, key)| key)
     }
 
-    /// Where the value at a path stands; for a missing one the header or key of the nearest table around it.
-    /// Of a value within a line, in which an option set a part, that part.
+    /// Place of the value at a path; for a missing value, the header or key of the nearest table around it.
+    /// If an option set a part of a value within a line, the place of that part.
     pub fn span(&self, path: &[&str]) -> Place {
         match self.node(path) {
             Some(node) if self.is_header(node) => node.place.clone(),
@@ -318,7 +317,7 @@ impl Source {
             && self.text.get(span.clone()).is_some_and(|text| text.starts_with('['))
     }
 
-    /// Where the key at a path stands; for a missing one the header or key of the nearest table around it.
+    /// Place of the key at a path; for a missing key, the header or key of the nearest table around it.
     pub fn key_span(&self, path: &[&str]) -> Place {
         match self.node(path) {
             Some(node) => node.key_place(),
@@ -342,9 +341,9 @@ impl Source {
         }
     }
 
-    /// Replaces a value of the file by one of the command line; missing tables on the way are made.
-    ///
-    /// Diagnostics about it say that it was given on the command line. The error says why the path cannot be.
+    /// Replaces a value of the file by one of the command line; missing tables on the path are made.
+    /// Diagnostics about the value say that it was given on the command line. The error says why the path is
+    /// impossible.
     pub fn set(&mut self, path: &[&str], value: impl Into<Value>) -> Result<(), Box<Diagnostic>> {
         let steps: Vec<_> = path.iter().map(|key| ((*key).to_owned(), Place::CommandLine)).collect();
         self.put(&steps, Node::of_command_line(value.into()))
@@ -353,10 +352,10 @@ impl Source {
     /// Takes an assignment in TOML, as `--set "law.liver.shear-modulus = 2e3"` gives it; a single word on the
     /// right needs no quotes. An item of an array has its index, counted from 0, as its key.
     ///
-    /// Diagnostics about it, here and later, underline it.
+    /// Diagnostics about the value, here and later, underline the assignment.
     ///
     /// # Errors
-    /// If it is no assignment, was made before, or its path cannot be.
+    /// If it is no assignment, was made before, or has an impossible path.
     pub fn assign(&mut self, assignment: &str) -> Result<(), Box<Diagnostic>> {
         let text: Arc<str> = format!("{SET}{assignment}").into();
         let (path, node) = parse_assignment(assignment, &text)?;
@@ -393,7 +392,7 @@ impl Source {
         &self.assignments
     }
 
-    /// Puts a value at a path of keys, each with its place; tables on the way are made where missing.
+    /// Puts a value at a path of keys, each with its place; missing tables on the path are made.
     fn put(&mut self, path: &[(String, Place)], value: Node) -> Result<(), Box<Diagnostic>> {
         let mut node = &mut self.root;
         for (depth, (key, place)) in path.iter().enumerate() {
@@ -502,7 +501,7 @@ fn no_such_item(path: &[(String, Place)], depth: usize, len: usize) -> Box<Diagn
     Box::new(diagnostic.help("items are counted from 0"))
 }
 
-/// Whether a text can stand without quotes in an assignment of the command line.
+/// True if a text can stand without quotes in an assignment of the command line.
 fn is_word(text: &str) -> bool {
     text.starts_with(|c: char| c.is_alphabetic() || "/.~_".contains(c)) && !text.contains(['"', '\'', '\n'])
 }
@@ -561,7 +560,7 @@ fn node_of(
     Node { place: Place::File(span), key_span, value: owned }
 }
 
-/// Whether a key is given twice only because its table is.
+/// True if a key is given twice only because its table is given twice.
 fn repeats_table(table: &Diagnostic, key: &Diagnostic, text: &str) -> bool {
     let twice = |diagnostic: &Diagnostic| diagnostic.message.ends_with(GIVEN_TWICE);
     let (Some(header), Some(own)) = (&table.span, &key.span) else { return false };

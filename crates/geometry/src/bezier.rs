@@ -8,7 +8,7 @@ use nalgebra::Matrix3;
 use crate::Vector3;
 use crate::locate::barycentric_of_closest;
 
-/// Where control points lie along the tangent of an edge.
+/// Rule for control points along the tangent of an edge.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum EdgeRule {
     /// 2/(3 c (1 + c)) of the tangent, with c the cosine between edge and tangent: arcs, three to four times
@@ -55,8 +55,8 @@ fn reach(rule: EdgeRule, c: f64) -> [f64; 3] {
 }
 
 impl CurvedTriangle {
-    /// A triangle of corners [m] and unit normals, with control points on the straight edge where told: next
-    /// to the first and the second end of the edges 12, 23 and 31.
+    /// Builds a triangle from corners [m] and unit normals. `straight` puts control points on the straight
+    /// edge: next to the first and the second end of the edges 12, 23 and 31.
     pub fn new(p: [Vector3; 3], n: [Vector3; 3], straight: [bool; 6], rule: EdgeRule) -> Self {
         let mut patch = Self { corners: p, normals: n, edge: [Vector3::zeros(); 6], straight, rule };
         for (k, [i, j]) in EDGES.into_iter().enumerate() {
@@ -93,7 +93,7 @@ impl CurvedTriangle {
         &self.edge
     }
 
-    /// Which of them lie on straight edges.
+    /// True for each control point on a straight edge.
     pub fn straight(&self) -> &[bool; 6] {
         &self.straight
     }
@@ -162,14 +162,14 @@ impl CurvedTriangle {
         along.cross(&across).normalize()
     }
 
-    /// The nearest point of the patch and its distance [m], by Gauss–Newton: each step moves to the nearest
-    /// point of the tangent triangle, and is halved until it comes closer.
+    /// Finds the nearest point of the patch and its distance [m], by Gauss–Newton. Each step moves to the
+    /// nearest point of the tangent triangle, and is halved until it comes closer.
     pub fn closest(&self, point: &Vector3, start: [f64; 3]) -> ([f64; 3], f64) {
         self.closest_in(40, point, start)
     }
 
-    /// The same with a limited number of steps. An early stop returns the distance of a nearby point, which
-    /// is never too small.
+    /// Finds the nearest point like [`closest`](Self::closest), with a limited number of steps. An early stop
+    /// returns the distance of a nearby point, which is never too small.
     pub fn closest_in(&self, steps: usize, point: &Vector3, start: [f64; 3]) -> ([f64; 3], f64) {
         let mut at = start;
         let mut distance = (self.point(at) - point).norm();
@@ -226,8 +226,8 @@ impl CurvedTriangle {
         (g * by_e + slope * t * c_e, g * by_n + slope * t * c_n)
     }
 
-    /// A force on an edge's control point as forces on the edge's vector and on the normal at its start: the
-    /// transposes of [`edge_derivative`](Self::edge_derivative) times the force.
+    /// Converts a force on an edge's control point to forces on the edge's vector and on the normal at its
+    /// start. These are the transposes of [`edge_derivative`](Self::edge_derivative) times the force.
     pub fn edge_forces(&self, k: usize, force: &Vector3) -> [Vector3; 2] {
         if self.straight[k] {
             return [force / 3.0, Vector3::zeros()];
@@ -249,8 +249,8 @@ impl CurvedTriangle {
         [by_e + pull * c_e, by_n - t * (pull * s / (size * length))]
     }
 
-    /// Second derivatives of w·b of an edge's control point b, for a vector w that stays: ∂²/∂e², ∂²/∂e∂n
-    /// (rows e) and ∂²/∂n².
+    /// Second derivatives of w·b of an edge's control point b, for a constant vector w. They are ∂²/∂e²,
+    /// ∂²/∂e∂n (rows e) and ∂²/∂n².
     pub fn edge_second_derivative(&self, k: usize, w: &Vector3) -> [Matrix3<f64>; 3] {
         if self.straight[k] {
             return [Matrix3::zeros(); 3];

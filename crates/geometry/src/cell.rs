@@ -1,5 +1,5 @@
-//! One cell at a time: its name in messages, its faces and edges, and the trilinear map of a hex,
-//! X(ξ) = Σ N_a(ξ) X_a with N_a = (1 + ξ_a ξ)(1 + η_a η)(1 + ζ_a ζ) / 8 on [−1, 1]³.
+//! One cell at a time: its name in messages, its faces and edges, and the trilinear map of a hex. The map is
+//! X(ξ) = Σ N_a(ξ) X_a. Its shape functions are N_a = (1 + ξ_a ξ)(1 + η_a η)(1 + ζ_a ζ) / 8 on [−1, 1]³.
 
 use std::fmt;
 

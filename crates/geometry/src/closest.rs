@@ -45,7 +45,7 @@ pub struct SurfacePoint {
     pub normal: Vector3,
     /// The face it lies on, as an index into the surface's faces.
     pub face: u32,
-    /// The three nodes around it (for a quad, those of one half).
+    /// The three nodes around it (for a quad, the nodes of one half).
     pub nodes: [u32; 3],
     /// Their weights, which add up to 1.
     pub weights: [f64; 3],

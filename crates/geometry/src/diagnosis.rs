@@ -59,7 +59,7 @@ pub struct Diagnosis {
     pub open_edges: Vec<[u32; 2]>,
     /// Without volume cells: edges whose two faces are turned to opposite sides.
     pub inconsistent_edges: Vec<[u32; 2]>,
-    /// Number of parts that hang together by faces of volume cells; without volume cells, by edges of
+    /// Number of parts that are connected by faces of volume cells; without volume cells, by edges of
     /// triangles and quads; 0 without either.
     pub components: usize,
 }

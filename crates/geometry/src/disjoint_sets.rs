@@ -1,4 +1,4 @@
-//! Disjoint sets: what hangs together, found pair by pair.
+//! Disjoint sets: connected items, found pair by pair.
 
 /// Disjoint sets of the numbers from 0 (union by smaller root, paths halved).
 ///

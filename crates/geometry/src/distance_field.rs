@@ -15,16 +15,18 @@ pub struct DistanceField {
 }
 
 impl DistanceField {
-    /// Of values [m] at the points of a grid, positive inside, i fastest. `None` if no value is positive,
-    /// their number does not match the grid, or the grid has fewer than two points along an axis.
+    /// Makes a field from values [m] at the points of a grid, positive inside, i fastest. `None` if no value
+    /// is positive, their number does not match the grid, or the grid has fewer than two points along an
+    /// axis.
     pub fn of_values(grid: Grid, values: Vec<f32>) -> Option<Self> {
         let fits = values.len() == grid.len() && grid.dims.iter().all(|&n| n > 1);
         let bounds = fits.then(|| positive_box(&grid, &values)).flatten()?;
         Some(Self { grid, values, bounds })
     }
 
-    /// Volume of the inside [m³]. Each cell round a point counts with its part, one mean step thick, on the
-    /// inner side of a plane at the distance of its centre.
+    /// Volume of the inside [m³]. Each cell round a point counts in part, by the share of the cell on the
+    /// inner side of a plane. The cell is one mean step thick, and the plane is at the distance of its
+    /// centre.
     pub fn volume(&self) -> f64 {
         let step = self.grid.voxel_volume().cbrt();
         let parts = self.values.par_iter().map(|&f| (0.5 + f64::from(f) / step).clamp(0.0, 1.0));
@@ -47,7 +49,7 @@ impl DistanceField {
         self.gradient_of(&values, &part)
     }
 
-    /// Both, for little more than one.
+    /// The value and the gradient, for little more than the cost of one.
     pub fn value_and_gradient(&self, point: &Vector3) -> (f64, Vector3) {
         let index = self.grid.index(point);
         let within = self.clamped(&index);
@@ -82,7 +84,7 @@ impl DistanceField {
         self.grid.gradient(&gradient)
     }
 
-    /// Smallest and largest corner of a box round all that is inside [m].
+    /// Smallest and largest corner of a box round the inside [m].
     pub fn bounds(&self) -> [Vector3; 2] {
         self.bounds
     }
@@ -97,8 +99,8 @@ impl DistanceField {
         Vector3::new(index.x.clamp(0.0, last[0]), index.y.clamp(0.0, last[1]), index.z.clamp(0.0, last[2]))
     }
 
-    /// The values at the corners of the cell that holds a place, bits of their numbers are steps along i, j
-    /// and k; and how far the place is from the first of them (0 to 1 along each axis).
+    /// Returns the values at the corners of the cell that holds a place, and the place within the cell (0 to
+    /// 1 along each axis). The bits of a corner's number are steps along i, j and k.
     fn round(&self, within: &Vector3) -> ([f64; 8], Vector3) {
         let [nx, ny, _] = self.grid.dims;
         // No place is negative, so the conversion rounds down.

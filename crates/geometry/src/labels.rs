@@ -42,7 +42,7 @@ impl From<i32> for CellLabel {
 }
 
 impl fmt::Display for CellLabel {
-    /// As it is typed.
+    /// Shows the label as a user types it.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Number(label) => write!(f, "{label}"),
@@ -59,7 +59,7 @@ pub enum UnknownLabel {
     Number {
         /// The requested label.
         label: String,
-        /// All labels with their names, increasing.
+        /// The labels of the mesh with their names, increasing.
         known: Vec<String>,
     },
     /// No label has the name.
@@ -69,7 +69,7 @@ pub enum UnknownLabel {
         name: String,
         /// The most similar name, if one is similar.
         nearest: Option<String>,
-        /// All labels with their names, increasing.
+        /// The labels of the mesh with their names, increasing.
         known: Vec<String>,
     },
     /// Neither a label nor a body has the name.
@@ -79,7 +79,7 @@ pub enum UnknownLabel {
         name: String,
         /// The most similar name of a body, an obstacle or a tool, if one is similar.
         nearest: Option<String>,
-        /// All labels with their names, then the names of bodies.
+        /// The labels of the mesh with their names, then the names of bodies.
         known: Vec<String>,
     },
     /// Several labels have the name.
@@ -115,7 +115,7 @@ impl FromIterator<(i32, Option<String>)> for Labels {
 }
 
 impl Labels {
-    /// Those of the body's cells of a mesh.
+    /// Labels of the body's cells of a mesh.
     pub fn of(mesh: &Mesh) -> Self {
         labels(mesh).into_iter().map(|label| (label, mesh.label_names.get(&label).cloned())).collect()
     }
@@ -144,7 +144,7 @@ impl Labels {
         self.0.iter().map(|(&label, name)| (label, name.as_deref()))
     }
 
-    /// How many there are.
+    /// Number of labels.
     pub fn len(&self) -> usize {
         self.0.len()
     }
@@ -162,7 +162,7 @@ impl Labels {
         }
     }
 
-    /// All of them with their names, increasing.
+    /// Each label with its name as text, increasing.
     pub fn all_shown(&self) -> Vec<String> {
         self.0.keys().map(|&label| self.shown(label)).collect()
     }
@@ -181,8 +181,8 @@ impl Labels {
         }
     }
 
-    /// The same, but a text may also be a range of numbers such as `5-8`: all existing labels in
-    /// it.
+    /// The number of a label, like [`Self::find`]. A text may also be a range of numbers such as `5-8`, which
+    /// gives all existing labels in the range.
     ///
     /// # Errors
     /// If no cell has such a label, or several labels have the name.

@@ -1,8 +1,8 @@
-//! Finds the cell that contains a point and the weights of its nodes: p = Σ w_a X_a. A point outside all
-//! cells uses the closest cell, extrapolated. A tet extrapolates with its own (barycentric) coordinates. A
-//! hex inverts its trilinear map by Newton's method. Outside, it takes the weights N_a(ξ) of its closest
-//! point and adds B_a · (p − X(ξ)) with its mean gradients B_a. This stays bounded where the trilinear map
-//! itself folds over, and is as exact: Σ_a X_a ⊗ B_a = I, so linear fields are reproduced everywhere.
+//! Finds the cell that contains a point and the weights of its nodes: p = Σ w_a X_a. For a point outside all
+//! cells, the closest cell is extrapolated. A tet extrapolates with its own (barycentric) coordinates. A hex
+//! inverts its trilinear map by Newton's method. Outside, it takes the weights N_a(ξ) of its closest point
+//! and adds B_a · (p − X(ξ)) with its mean gradients B_a. These weights stay bounded where the trilinear map
+//! itself folds over. They are as exact: Σ_a X_a ⊗ B_a = I, so linear fields are reproduced everywhere.
 
 use rstar::{AABB, PointDistance, RTree, RTreeObject};
 
@@ -18,7 +18,7 @@ const ROUNDING: f64 = 1e-12;
 /// Cells of less volume than this part of the cube of their size can't give weights and are left out.
 const FLAT: f64 = 1e-14;
 
-/// Where a point is in a mesh.
+/// Position of a point in a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Location {
     /// Shape of the cell.
@@ -45,10 +45,10 @@ impl Location {
     }
 }
 
-/// A search tree over the tets and hexes of a mesh, with its own copy of them. Outside the mesh, the weights
-/// of the closest cell continue linearly: for a tet its barycentric coordinates; for a hex the weights at its
-/// closest point, plus its mean gradients times the offset from there. Cells with missing or non-finite nodes
-/// and cells without volume are skipped.
+/// A search tree over the tets and hexes of a mesh, with its own copy of their data. Outside the mesh, the
+/// weights of the closest cell continue linearly. For a tet these are its barycentric coordinates. For a hex
+/// they are the weights at its closest point, plus its mean gradients times the offset from there. Cells with
+/// missing or non-finite nodes and cells without volume are skipped.
 #[derive(Clone, Debug)]
 pub struct Locator {
     tree: RTree<Entry>,
@@ -99,15 +99,15 @@ impl Locator {
     }
 
     /// The cell that contains `point` [m], otherwise the closest one; `None` without cells or if the point is
-    /// not finite. On a face between cells it is the first of them. Among equally close cells it is the one
-    /// with the smallest extrapolation, then the first. Tets come before hexes.
+    /// not finite. On a face between cells it is the first cell. Among equally close cells it is the one with
+    /// the smallest extrapolation, then the first. Tets come before hexes.
     pub fn locate(&self, point: Vector3) -> Option<Location> {
         if !is_finite(&point) {
             return None;
         }
         let mut best: Option<Candidate> = None;
-        // Ordered by the distance of the box, a lower bound for that of the cell: after the first box that
-        // is too far, all others are.
+        // Ordered by the distance of the box, a lower bound for the distance of the cell. After the first box
+        // that is too far, all others are.
         for (entry, box_distance_2) in self.tree.nearest_neighbor_iter_with_distance_2(point.into()) {
             if best.as_ref().is_some_and(|b| box_distance_2.sqrt() > b.distance + b.tolerance) {
                 break;
@@ -265,8 +265,8 @@ impl Entry {
         best
     }
 
-    /// The same on one face: the closest point of four triangles around its centre, then Gauss–Newton on the
-    /// bilinear face from there, as long as it comes closer.
+    /// Finds the closest point of one face. It starts from the closest point of four triangles around the
+    /// centre. Gauss–Newton steps on the bilinear face follow, as long as they come closer.
     fn closest_on_face(&self, face: &[usize], p: &Vector3) -> (Vector3, f64) {
         let ring = [face[0], face[1], face[2], face[3]];
         let xi_centre = ring.iter().map(|&a| Vector3::from(HEX_CORNERS[a])).sum::<Vector3>() / 4.0;
@@ -332,8 +332,8 @@ pub(crate) fn on_triangle(x: &[Vector3; 3], weights: [f64; 3]) -> Vector3 {
     x[0] * weights[0] + x[1] * weights[1] + x[2] * weights[2]
 }
 
-/// Barycentric coordinates of the point of a triangle closest to `p`: the corner, edge or face in whose
-/// Voronoi region `p` lies (Ericson, Real-Time Collision Detection, 2005, section 5.1.5).
+/// Barycentric coordinates of the point of a triangle closest to `p`. It is on the corner, edge or face in
+/// whose Voronoi region `p` lies (Ericson, Real-Time Collision Detection, 2005, section 5.1.5).
 pub fn barycentric_of_closest([a, b, c]: &[Vector3; 3], p: &Vector3) -> [f64; 3] {
     let (ab, ac) = (b - a, c - a);
     let from = |x: &Vector3| (ab.dot(&(p - x)), ac.dot(&(p - x)));

@@ -65,7 +65,7 @@ impl CellKind {
 pub struct DataArray {
     /// Numbers per item: 1 scalar, 3 vector, 9 tensor (row-major).
     pub components: usize,
-    /// All values, item after item; length = items × components.
+    /// Values, item after item; length = items × components.
     pub values: Vec<f64>,
 }
 
@@ -91,7 +91,7 @@ impl DataArray {
     }
 }
 
-/// All cells of one kind.
+/// Cells of one kind.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CellBlock {
     /// Their shape.
@@ -145,7 +145,7 @@ impl CellBlock {
         }
     }
 
-    /// All cells in order.
+    /// Cells in order.
     pub fn cells(&self) -> std::slice::ChunksExact<'_, u32> {
         self.nodes.chunks_exact(self.kind.node_count())
     }
@@ -238,7 +238,7 @@ impl Mesh {
         found.then_some(points)
     }
 
-    /// Whether a volume cell uses each point, or any cell if the mesh has no volume cells.
+    /// True for each point that a volume cell uses, or any cell if the mesh has no volume cells.
     pub(crate) fn used_points(&self) -> Vec<bool> {
         let mut used = vec![false; self.points.len()];
         let solid = self.volume_blocks().any(|block| !block.is_empty());
@@ -251,8 +251,8 @@ impl Mesh {
         used
     }
 
-    /// Removes points that no cell uses (with volume cells: that no volume cell uses), with their data and
-    /// their surface cells; returns the number of points.
+    /// Removes points that no cell uses (with volume cells: no volume cell), with their data and their
+    /// surface cells. Returns the number of points.
     pub fn drop_unused_points(&mut self) -> usize {
         let used = self.used_points();
         for block in &mut self.blocks {

@@ -1,25 +1,25 @@
 //! Mortar rows: how the nodes of one surface follow another surface whose mesh does not match, so that a
 //! constant stress passes.
 //!
-//! A multiplier ψ_a at each tied node of the follower asks for ∫ ψ_a (u_f − u_m) = 0 over the common area.
-//! The ψ_a are dual to the shape functions N_b of the follower, ∫ ψ_a N_b = δ_ab ∫ N_b (Wohlmuth 2000), so
-//! that each tied node has a row of its own,
+//! A multiplier ψ_a at each tied node of the follower requires ∫ ψ_a (u_f − u_m) = 0 over the common area.
+//! The ψ_a are dual to the shape functions N_b of the follower, ∫ ψ_a N_b = δ_ab ∫ N_b (Wohlmuth 2000). So
+//! each tied node has its own row:
 //!
 //! ```text
 //! u_a = Σ_m M_am u_m / D_a,   M_am = ∫ ψ_a N_m,   D_a = ∫ N_a.
 //! ```
 //!
-//! * *Integration* goes over segments: a face of the other surface is projected on the plane of a follower's
-//!   face and clipped by it (Puso and Laursen 2004), the polygon is split into triangles round its centre,
-//!   and these have Gauss points. ψ, D and M take the same points, so that linear fields are followed to
-//!   round-off whatever the rule. The rule decides how well forces go on: exactly for triangles and
+//! * *Integration* runs over segments. A face of the other surface is projected on the plane of a follower's
+//!   face and clipped by this face (Puso and Laursen 2004). The polygon is split into triangles round its
+//!   centre, which have Gauss points. The same points are used for ψ, D and M, so linear fields are followed
+//!   to round-off whatever the rule. The rule decides how exactly forces pass: exactly for triangles and
 //!   parallelograms, to about 1e-12 for other quadrilaterals.
 //! * *Borders.* ψ on a face comes from the part that has a counterpart (Cichosz and Bischoff 2011). Nodes of
 //!   the face that are not tied, such as those beyond the end of the other surface, have no ψ. Their shape
-//!   functions are shared out among those of the tied nodes, so that Σ ψ_a = 1 everywhere (as at crosspoints,
-//!   Puso and Laursen 2004), and they appear in the rows of the others.
-//! * *Curved surfaces.* A row gives Σ X_m ≠ X_a where the meshes are apart; [`MortarRow::offset`] is the
-//!   rest, which the caller has to add by a gradient, so that rotations cost nothing.
+//!   functions are shared out among the tied nodes, so that Σ ψ_a = 1 everywhere (as at crosspoints, Puso and
+//!   Laursen 2004). These nodes appear in the rows of the tied ones.
+//! * *Curved surfaces.* A row gives Σ X_m ≠ X_a where the meshes are apart. [`MortarRow::offset`] is the
+//!   difference. The caller has to add it by a gradient, so that rotations cost nothing.
 
 use std::collections::BTreeMap;
 
@@ -28,9 +28,9 @@ use rstar::{AABB, RTree, primitives::GeomWithData, primitives::Rectangle};
 
 use crate::{CellKind, Face, Vector3};
 
-/// Faces whose normals are nearer than this to the same direction, as a cosine, do not lie on each other.
+/// Largest cosine between the normals of two faces that lie on each other.
 const FACING: f64 = -0.5;
-/// Segments of less than this part of a face are round-off.
+/// Segments below this part of a face are round-off.
 const SLIVER: f64 = 1e-10;
 /// Weights below this are round-off.
 const TINY: f64 = 1e-15;
@@ -40,11 +40,11 @@ const TINY: f64 = 1e-15;
 pub struct MortarSide<'a> {
     /// Its faces.
     pub faces: &'a [Face],
-    /// All points [m], by the numbers that faces have.
+    /// Points [m], by the numbers that faces have.
     pub points: &'a [Vector3],
 }
 
-/// How a node follows others.
+/// Dependence of a node on other nodes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MortarRow {
     /// The node of the follower.
@@ -53,7 +53,7 @@ pub struct MortarRow {
     pub followed: Vec<(u32, f64)>,
     /// Nodes of its own side that are not tied, with their weights. All weights of both sides sum to 1.
     pub own: Vec<(u32, f64)>,
-    /// The place of the node less that of the nodes that it follows [m]: zero up to round-off where both
+    /// The place of the node less the place that its weights give [m]: zero up to round-off where both
     /// surfaces are flat.
     pub offset: Vector3,
 }
@@ -63,14 +63,14 @@ pub struct MortarRow {
 pub struct MortarRows {
     /// By increasing node.
     pub rows: Vec<MortarRow>,
-    /// Common area that no tied node takes part in [m²], and all common area.
+    /// Common area that no tied node takes part in [m²].
     pub untied: f64,
     /// Common area [m²].
     pub area: f64,
 }
 
-/// The rows of the nodes of `follower` that are tied, over the faces that lie on those of `other` with a gap
-/// of at most `reach` [m], or half of the size of the follower's face.
+/// Computes the rows of the tied nodes of `follower`, over its faces that lie on faces of `other`. The gap is
+/// at most `reach` [m], or half of the size of the follower's face if that is more.
 pub fn mortar_rows(
     follower: MortarSide<'_>,
     other: MortarSide<'_>,
@@ -128,7 +128,7 @@ pub fn mortar_rows(
     found
 }
 
-/// What is summed up for a tied node.
+/// Sums for a tied node.
 #[derive(Default)]
 struct Sums {
     diagonal: f64,
@@ -151,9 +151,9 @@ impl Sums {
     }
 }
 
-/// The coefficients of ψ over the shape functions of a face, a row for each tied node: D G⁻¹ φ with the shape
-/// functions of the nodes that are not tied shared out in φ and G = ∫ φ Nᵀ over those that are. `None`
-/// without common area or tied nodes.
+/// The coefficients of ψ over the shape functions of a face, a row for each tied node: D G⁻¹ φ. In φ, the
+/// shape functions of nodes that are not tied are shared out among the tied ones, and G = ∫ φ Nᵀ over these.
+/// `None` without common area or tied nodes.
 fn dual_functions(segments: &[(usize, Vec<Sample>)], nodes: usize, tied: &[usize]) -> Option<DMatrix<f64>> {
     let mut mass = DMatrix::zeros(nodes, nodes);
     for sample in segments.iter().flat_map(|(_, samples)| samples) {
@@ -221,8 +221,8 @@ struct Projected {
 }
 
 impl Projected {
-    /// The part that lies below another face, in Gauss points; `None` if there is none, or the gap at its
-    /// centre is wider than `reach` [m].
+    /// The part that lies below another face, in Gauss points. `None` without such a part, or if the gap at
+    /// its centre is wider than `reach` [m].
     fn segment(&self, other: &Self, reach: f64) -> Option<Vec<Sample>> {
         let polygon = clipped(&other.corners, &self.corners);
         let whole = doubled_area(&self.corners);
@@ -255,8 +255,8 @@ impl Projected {
 
     /// Gauss points along a side of a segment for an error of 1e-13. On triangles and parallelograms the
     /// product of two shape functions is of fourth order at most. On other quadrilaterals shape functions are
-    /// not polynomials of the place: they end where the Jacobian J₀ + J₁ ξ + J₂ η vanishes, and n points
-    /// leave ρ^(−2n) with ρ = z + √(z² − 1), z = J₀/(|J₁| + |J₂|).
+    /// not polynomials of the place. They are singular where the Jacobian J₀ + J₁ ξ + J₂ η vanishes. The
+    /// error of n points is ρ^(−2n) with ρ = z + √(z² − 1), z = J₀/(|J₁| + |J₂|).
     fn gauss_points(&self) -> usize {
         const AFFINE: usize = 3;
         let x = &self.corners;
@@ -266,7 +266,7 @@ impl Projected {
         let [u, v, w] = [x[1] + x[2] - x[0] - x[3], x[2] + x[3] - x[0] - x[1], x[0] - x[1] + x[2] - x[3]];
         let z = u.perp(&v).abs() / (u.perp(&w).abs() + w.perp(&v).abs());
         let digits = 13.0 * std::f64::consts::LN_10;
-        // An infinite z, of a parallelogram, needs none of them.
+        // An infinite z, of a parallelogram, needs no more points.
         let more = digits / (2.0 * z.max(1.05).acosh());
         (AFFINE + more.ceil() as usize).min(16)
     }
@@ -333,8 +333,8 @@ fn clipped(polygon: &[Vector2<f64>], by: &[Vector2<f64>]) -> Vec<Vector2<f64>> {
     left
 }
 
-/// Points (s, t) of the triangle s, t ≥ 0, s + t ≤ 1 with their weights, which sum to ½: the product of Gauss
-/// rules of `n` points on the square, collapsed. Exact for polynomials of order 2 n − 2.
+/// Points (s, t) of the triangle s, t ≥ 0, s + t ≤ 1 with their weights, which sum to ½. This is the product
+/// of Gauss rules of `n` points on the square, collapsed. Exact for polynomials of order 2 n − 2.
 fn triangle_rule(n: usize) -> Vec<([f64; 2], f64)> {
     let line = gauss_rule(n);
     let point =
@@ -380,8 +380,8 @@ mod tests {
 
     type MeshOfCells = fn([u32; 3]) -> Mesh;
 
-    /// A block over [0, 1] × [0, 1] with so many cells each way whose points move by up to a part of a cell,
-    /// those on its sides along them.
+    /// A block over [0, 1] × [0, 1] with `cells` cells each way. Its points move by up to a part of a cell,
+    /// points on its sides along them.
     fn block(mut mesh: Mesh, cells: [u32; 3], height: f64, seed: u64, amount: f64) -> Mesh {
         let mut random = Random::new(seed);
         for point in &mut mesh.points {
@@ -416,8 +416,8 @@ mod tests {
         areas
     }
 
-    /// Crooked meshes of tets and hexes in every order: a row sums to 1 and follows linear fields, and a
-    /// constant stress goes on as the other mesh has it.
+    /// Crooked meshes of tets and hexes in every order. A row sums to 1 and follows linear fields, and a
+    /// constant stress passes from mesh to mesh.
     #[test]
     fn rows_pass_linear_fields_and_constant_stresses() {
         let kinds: [(MeshOfCells, &str); 2] = [(block_of_hexes, "hexes"), (block_of_tets, "tets")];
@@ -453,7 +453,7 @@ mod tests {
     }
 
     /// The other surface ends within faces of the follower: nodes beyond its end are not tied. A row with
-    /// them sums to 1 and is followed by linear fields, and forces of a constant stress on the common area
+    /// these nodes sums to 1 and follows linear fields. Forces of a constant stress on the common area
     /// balance at every node.
     #[test]
     fn faces_that_reach_beyond_the_other_surface_count_in_part() {

@@ -1,4 +1,4 @@
-//! The part of a surface around a point, as a hand takes hold of it.
+//! The part of a surface around a point, as a hand grips it.
 
 use std::collections::HashSet;
 
@@ -7,10 +7,10 @@ use crate::Vector3;
 /// Edges within which a hand holds a surface.
 const REACH: f64 = 2.0;
 
-/// The points of a surface around one of them, with weights that sum to 1: those within a radius [m] that
-/// hang together with the triangle where the point is, in whose corners it has the weights given; two mean
-/// edges of that triangle if no radius is given. Weights are those of a Gaussian whose deviation is half of
-/// the radius. Where nothing else is near, the corners with their own weights.
+/// Points of a surface around a place on it, with weights that sum to 1. The place lies in a triangle with
+/// given weights of its corners. The patch is the points within a radius [m] that are connected to this
+/// triangle. Without a radius it is two mean edges of the triangle. Weights follow a Gaussian whose deviation
+/// is half of the radius. If no point is within the radius, the corners are returned with their own weights.
 ///
 /// ```
 /// use pliant_geometry::{Vector3, patch};

@@ -1,8 +1,8 @@
-//! Size and shape of cells. The acoustic length l = V / ‖∫∇N‖ = (Σ_a |B_a|²)^(−1/2), with B_a the mean
-//! gradient of shape function a, is the characteristic length of the explicit time step: a step of l / c is
-//! stable, with the speed c of pressure waves. For a tet B_a = ∇N_a and |B_a| = 1/h_a with the heights h_a,
-//! so l = 6 V / (Σ (2 A_a)²)^(1/2); for a hex 2×2×2 Gauss points give the exact mean.
-//! Leaves out: materials, and with them the time step itself.
+//! Size and shape of cells. The acoustic length is the characteristic length of the explicit time step. A
+//! step of l / c is stable, with the speed c of pressure waves. It is l = V / ‖∫∇N‖ = (Σ_a |B_a|²)^(−1/2),
+//! with B_a the mean gradient of shape function a. For a tet B_a = ∇N_a and |B_a| = 1/h_a with the heights
+//! h_a. So l = 6 V / (Σ (2 A_a)²)^(1/2). For a hex 2×2×2 Gauss points give the exact mean. Leaves out:
+//! materials, and with them the time step itself.
 
 use std::fmt;
 
@@ -66,9 +66,9 @@ pub fn gradient_integrals(kind: CellKind, points: &[Vector3]) -> (f64, [Vector3;
     (volume, integrals)
 }
 
-/// Acoustic length l = (Σ_a |B_a|²)^(−1/2) [m] of a tet or a hex, with the mean shape gradients B_a; of a
-/// tet, (Σ 1/h_a²)^(−1/2) with its heights. A time step of l / c is stable, c being the speed of pressure
-/// waves. Negative if inverted, 0 if flat, and 0 for other kinds.
+/// Acoustic length l = (Σ_a |B_a|²)^(−1/2) [m] of a tet or a hex, with the mean shape gradients B_a. For a
+/// tet with heights h_a it is (Σ 1/h_a²)^(−1/2). A time step of l / c is stable, c being the speed of
+/// pressure waves. Negative if inverted, 0 if flat, and 0 for other kinds.
 pub fn acoustic_length(kind: CellKind, points: &[Vector3]) -> f64 {
     let (volume, integrals) = gradient_integrals(kind, points);
     let norm = integrals.iter().map(|b| b.norm_squared()).sum::<f64>().sqrt();
@@ -76,8 +76,8 @@ pub fn acoustic_length(kind: CellKind, points: &[Vector3]) -> f64 {
 }
 
 /// Acoustic length relative to the ideal cell of the same volume, a regular tet or a cube: 1 ideal, 0 flat,
-/// negative inverted. Dimensionless. No tet exceeds 1. A hex may exceed it slightly (1.007 where the corners
-/// of a cube move by up to 0.4 of its side), because mean gradients don't detect every distortion: check
+/// negative inverted. Dimensionless. No tet exceeds 1. A hex may exceed it slightly: 1.007 where the corners
+/// of a cube move by up to 0.4 of its side. Mean gradients don't detect every distortion, so check
 /// [`scaled_jacobian`] too.
 pub fn relative_acoustic_length(kind: CellKind, points: &[Vector3]) -> f64 {
     let volume = volume(kind, points);
@@ -128,7 +128,7 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// Of `values`, which it sorts; `None` without any.
+    /// Spread of `values`, which it sorts; `None` without any.
     fn of(values: &mut [f64]) -> Option<Self> {
         values.sort_unstable_by(f64::total_cmp);
         let (&min, &max) = (values.first()?, values.last()?);
@@ -158,9 +158,9 @@ pub struct QualityReport {
     pub scaled_jacobian: Option<f64>,
     /// Length of the edges of all cells [m], each edge once.
     pub edge_length: Option<Spread>,
-    /// Tets and hexes by acoustic length relative to the ideal cell of the same volume: bin i counts those
-    /// from i/10 to (i+1)/10. Inverted and flat cells are in the first bin, the few hexes above 1 in the
-    /// last.
+    /// Number of tets and hexes by acoustic length relative to the ideal cell of the same volume. Bin i
+    /// counts cells from i/10 to (i+1)/10. Inverted and flat cells are in the first bin, the few hexes above
+    /// 1 in the last.
     pub histogram: [usize; 10],
 }
 
@@ -242,8 +242,8 @@ impl QualityReport {
         acoustic_length(kind, points)
     }
 
-    /// The histogram as ten lines of text, range, bar and count; the longest bar has 40 characters and no
-    /// count above 0 is without a bar.
+    /// The histogram as ten lines of text: range, bar and count. The longest bar has 40 characters, and every
+    /// count above 0 has a bar.
     pub fn histogram_lines(&self) -> Vec<String> {
         let most = self.histogram.iter().copied().max().unwrap_or(0).max(1);
         let digits = most.to_string().len();

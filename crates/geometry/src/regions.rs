@@ -1,6 +1,5 @@
-//! Regions of a mesh by the marks of their cells: those of a label (cell data `label`), and those of a body,
-//! an obstacle or a tool (cell data `body`). Users name them to hide them, or to give them a look of their
-//! own.
+//! Regions of a mesh by the marks of their cells: a label (cell data `label`), or a body, an obstacle or a
+//! tool (cell data `body`). Users name regions to hide them, or to change their look.
 
 use std::collections::BTreeMap;
 
@@ -10,14 +9,14 @@ use crate::{CellBlock, Mesh, cell_label};
 /// Cells with a mark in common.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Region {
-    /// Those of a label.
+    /// Cells of a label.
     Label(i32),
-    /// Those of a body, an obstacle or a tool.
+    /// Cells of a body, an obstacle or a tool.
     Body(i32),
 }
 
 impl Region {
-    /// Whether a cell with these marks is in it.
+    /// True if a cell with these marks is in it.
     pub fn has(self, label: Option<i32>, body: i32) -> bool {
         match self {
             Self::Label(own) => label == Some(own),
@@ -42,7 +41,7 @@ pub struct RegionNames {
 }
 
 impl RegionNames {
-    /// Those of a mesh.
+    /// Names of the regions of a mesh.
     pub fn of(mesh: &Mesh) -> Self {
         Self { labels: Labels::of(mesh), bodies: mesh.body_names.clone() }
     }

@@ -1,6 +1,6 @@
-//! Selects nodes or boundary faces of a mesh, as a scene file does: by a box, a plane, a named set, a label,
-//! the interface of two labels, and unions, intersections and differences of these.
-//! Leaves out: cells inside; selections of the moving body (positions are those of the mesh).
+//! Selects nodes or boundary faces of a mesh, as a scene file does. Selections are boxes, planes, named sets,
+//! labels, the interface of two labels, and unions, intersections and differences of selections. Leaves out:
+//! cells inside; selections of the moving body (positions belong to the mesh at rest).
 
 use std::fmt;
 
@@ -19,11 +19,11 @@ const PLANE_TOLERANCE: f64 = 1e-5;
 /// Slack of the comparison of angles [°].
 const ANGLE_SLACK: f64 = 1e-6;
 
-/// Nodes or boundary faces of a body, chosen by position, by name or by label. Positions are those of the
+/// Nodes or boundary faces of a body, chosen by position, by name or by label. Positions are taken in the
 /// mesh before any motion [m].
 ///
-/// Where faces are asked for, a boundary face is selected if all its nodes are; `normal` looks at the face
-/// itself, `label` and sets of volume cells at the cell behind it, and sets of triangles or quads name faces
+/// Where faces are needed, a boundary face is selected if all its nodes are. `normal` looks at the face
+/// itself, `label` and sets of volume cells at the cell behind it. Sets of triangles or quads name faces
 /// directly. The boundary of a mesh of triangles and quads alone is the whole mesh.
 #[derive(Deserialize, Serialize, JsonSchema, Clone, Debug, PartialEq)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
@@ -74,12 +74,12 @@ pub enum Selection {
         #[schemars(range(min = 0.0, max = 180.0))]
         within: f64,
     },
-    /// The nodes closest to a point: `{ nearest = { point = [0, 0, 0.05] } }`. Of nodes at the same distance,
-    /// those of smaller index.
+    /// The nodes closest to a point: `{ nearest = { point = [0, 0, 0.05] } }`. Among nodes at the same
+    /// distance, smaller indices come first.
     Nearest {
         /// The point [m].
         point: [f64; 3],
-        /// How many nodes, 1 or more (all, if the mesh has fewer). Default: 1.
+        /// Number of nodes, 1 or more (all, if the mesh has fewer). Default: 1.
         #[serde(default = "one")]
         #[schemars(range(min = 1))]
         count: u32,
@@ -94,11 +94,11 @@ pub enum Selection {
     LabelBoundary([CellLabel; 2]),
     /// Nodes by index, counted from 0: `{ ids = [0, 5, 17] }`.
     Ids(Vec<u32>),
-    /// What any of the selections holds: `{ union = [{ set = "a" }, { set = "b" }] }`.
+    /// Everything that any of the selections holds: `{ union = [{ set = "a" }, { set = "b" }] }`.
     Union(Vec<Selection>),
-    /// What every one of the selections holds: `{ intersection = ["boundary", { label = 2 }] }`.
+    /// Everything that each of the selections holds: `{ intersection = ["boundary", { label = 2 }] }`.
     Intersection(Vec<Selection>),
-    /// What the first selection holds and none of the others:
+    /// Everything that the first selection holds and none of the others:
     /// `{ difference = ["boundary", { set = "cut" }] }`.
     Difference(Vec<Selection>),
 }
@@ -117,7 +117,7 @@ pub enum SelectionError {
         name: String,
         /// The most similar name, if one is similar.
         nearest: Option<String>,
-        /// All names, sorted.
+        /// Names of the sets, sorted.
         known: Vec<String>,
     },
     /// A set of the mesh names something beyond its end.
@@ -131,7 +131,7 @@ pub enum SelectionError {
         of: &'static str,
         /// The index that does not exist.
         index: u32,
-        /// How many there are.
+        /// Number of existing items.
         count: usize,
     },
     /// A node index is beyond the last node.
@@ -148,7 +148,7 @@ pub enum SelectionError {
     /// A direction without length.
     #[error("{what} is zero: it must point somewhere, for example [0, 0, 1]")]
     ZeroDirection {
-        /// Which one: `normal of the plane`, …
+        /// The direction: `normal of the plane`, …
         what: &'static str,
     },
     /// The smallest corner of a box is beyond the largest.
@@ -156,15 +156,15 @@ pub enum SelectionError {
     ReversedBox {
         /// `x`, `y` or `z`.
         axis: char,
-        /// Where the box begins [m].
+        /// Start of the box [m].
         min: f64,
-        /// Where the box ends [m].
+        /// End of the box [m].
         max: f64,
     },
     /// A number is infinite or not a number.
     #[error("{what} must be finite, not {value}")]
     NotFinite {
-        /// Which one: `centre of the sphere`, …
+        /// The quantity: `centre of the sphere`, …
         what: &'static str,
         /// The number.
         value: f64,
@@ -172,7 +172,7 @@ pub enum SelectionError {
     /// A number is outside of its range.
     #[error("{what} must be {range}, not {value}")]
     OutOfRange {
-        /// Which one: `radius of the sphere`, …
+        /// The quantity: `radius of the sphere`, …
         what: &'static str,
         /// The number.
         value: f64,
@@ -184,9 +184,9 @@ pub enum SelectionError {
     TooFewParts {
         /// `union`, `intersection` or `difference`.
         operation: &'static str,
-        /// How many it needs.
+        /// Number of selections needed.
         least: usize,
-        /// How many it has.
+        /// Number of selections given.
         count: usize,
     },
     /// Nothing is selected.
@@ -283,7 +283,7 @@ impl Selection {
         }
     }
 
-    /// Unions, intersections and differences of what `leaf` says of the other selections.
+    /// Combines the results of `leaf` for the other selections in unions, intersections and differences.
     fn evaluate(&self, leaf: &dyn Fn(&Self) -> Indices) -> Indices {
         self.check()?;
         let Some(parts) = self.parts() else { return leaf(self) };
@@ -299,7 +299,7 @@ impl Selection {
         Ok(sorted(first))
     }
 
-    /// How far a point [m] is from a region of space, 0 inside; `None` for selections of another sort.
+    /// Distance of a point [m] from a region of space, 0 inside; `None` for selections of another sort.
     fn gap(&self, p: &Vector3) -> Option<f64> {
         // `check` has made sure that normals are not zero.
         let height = |point: &[f64; 3], normal: &[f64; 3]| {
@@ -503,7 +503,7 @@ impl View<'_> {
         SelectionError::Empty { selection: selection.to_string(), wanted: wanted.name(), hint }
     }
 
-    /// Why a selection selects nothing.
+    /// Reason that a selection selects nothing.
     fn reason(&self, selection: &Selection, wanted: Wanted) -> String {
         if self.mesh.points.is_empty() {
             return "the mesh has no points".to_owned();

@@ -1,8 +1,8 @@
 //! Wedges and pyramids become tets, because no element of a body has their shape. Each quadrilateral face is
-//! cut along the diagonal through its node of the smallest number, so the cells on both sides of the face
+//! cut along the diagonal through its node of the smallest number. So the cells on both sides of the face
 //! agree (Dompierre, Labbé, Vallet and Camarero 1999). A cell is the cone from its smallest node to the
 //! triangles of its other faces. Hexes that share a face with a split cell are split as well: a hex and two
-//! tets on one face fail the patch test. Where two tets already meet a face, their diagonal counts; if a cell
+//! tets on one face fail the patch test. Where two tets already meet a face, their diagonal counts. If a cell
 //! then has no node for a cone, the cone starts from a new node at its centre.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -229,7 +229,7 @@ impl Splitter {
         beyond.map(|[a, b, c]| [a, c, b, apex]).collect()
     }
 
-    /// Whether a face is cut from its first to its third node.
+    /// True if a face is cut from its first to its third node.
     fn is_cut_at_first(&self, nodes: [u32; 4]) -> bool {
         let [a, b, c, d] = nodes;
         match self.diagonals(nodes) {
@@ -239,15 +239,15 @@ impl Splitter {
         }
     }
 
-    /// Whether two tets meet a face that are cut from its first to its third node, or from its second to its
-    /// fourth.
+    /// True for each diagonal along which two tets already meet a face: from its first to its third node, and
+    /// from its second to its fourth.
     fn diagonals(&self, [a, b, c, d]: [u32; 4]) -> [bool; 2] {
         let meets = |tets: [[u32; 3]; 2]| tets.iter().all(|face| self.triangles.contains(&face_key(face)));
         [meets([[a, b, c], [a, c, d]]), meets([[a, b, d], [b, c, d]])]
     }
 }
 
-/// The same for every face of the same nodes.
+/// Key of a face, equal for all faces of the same nodes.
 fn key(nodes: &[u32], face: &[usize]) -> [u32; 4] {
     let mut own = [0; 4];
     own.iter_mut().zip(face).for_each(|(own, &at)| *own = nodes[at]);
@@ -413,7 +413,7 @@ mod tests {
             ..Mesh::default()
         };
         mesh.point_data.insert("x".into(), DataArray::scalar(mesh.points.iter().map(|x| x.x).collect()));
-        // On the outward faces 0 1 4 3, 1 2 5 4 and 2 0 3 5, cut along 0 4, 1 5 and 2 3.
+        // On the outward faces 0 1 4 3, 1 2 5 4 and 2 0 3 5. They are cut along 0 4, 1 5 and 2 3.
         let tets: [[u32; 4]; 6] =
             [[0, 1, 4, 6], [0, 4, 3, 6], [1, 2, 5, 7], [1, 5, 4, 7], [2, 0, 3, 8], [2, 3, 5, 8]];
         mesh.block_mut(CellKind::Tet).nodes = tets.concat();

@@ -65,7 +65,7 @@ impl Face {
         Some(Self { kind, parent, corners })
     }
 
-    /// The same for every face of the same nodes.
+    /// Key of the face, equal for all faces of the same nodes.
     fn key(&self) -> [u32; 4] {
         face_key(self.nodes())
     }
@@ -170,8 +170,8 @@ impl Surface {
         self.faces.iter().map(|face| face.area(points)).sum()
     }
 
-    /// Outward unit normals, one per point of the mesh: the mean of the normals of the faces around it,
-    /// weighted by area; zero at points that are not on the surface.
+    /// Outward unit normals, one per point of the mesh. Each is the mean of the normals of the faces around
+    /// the point, weighted by area. It is zero at points that are not on the surface.
     pub(crate) fn node_normals(&self, points: &[Vector3]) -> Vec<Vector3> {
         let mut normals = vec![Vector3::zeros(); points.len()];
         for face in &self.faces {
@@ -183,8 +183,8 @@ impl Surface {
         normals.into_iter().map(|normal| normal.try_normalize(0.0).unwrap_or_default()).collect()
     }
 
-    /// The surface as a separate mesh, with triangles and quads in the order of the faces, and for each of
-    /// its points the original index in `points`.
+    /// Returns the surface as a separate mesh, with triangles and quads in the order of the faces. Also
+    /// returns the original index in `points` of each of its points.
     pub fn to_mesh(&self, points: &[Vector3]) -> (Mesh, Vec<u32>) {
         let parents = self.nodes();
         let mut own = vec![0; points.len()];

@@ -41,7 +41,7 @@ pub(crate) fn block_of_hexes(cells: [u32; 3]) -> Mesh {
     mesh
 }
 
-/// The same block, each cube cut into six tets around its diagonal from 0 to 6 (Kuhn).
+/// A block of unit cubes, each cut into six tets around its diagonal from 0 to 6 (Kuhn).
 pub(crate) fn block_of_tets(cells: [u32; 3]) -> Mesh {
     let hexes = block_of_hexes(cells);
     let mut mesh = Mesh { points: hexes.points.clone(), ..Mesh::default() };

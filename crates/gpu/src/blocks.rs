@@ -27,7 +27,7 @@ struct Block {
 /// The blocks of a solid on the device.
 pub(crate) struct DeviceBlocks {
     pub bound: Bound,
-    /// How many there are.
+    /// Number of blocks.
     pub count: usize,
     /// The cells, block by block; some are in several blocks.
     pub order: Vec<u32>,
@@ -51,7 +51,7 @@ fn sorted(mut numbers: Vec<u32>) -> Vec<u32> {
 /// Cuts things at some places into blocks by halving along the longest side.
 struct Bisection<'a> {
     places: &'a [Vector<f64>],
-    /// Blocks have a whole multiple of so many where possible, so that all but the last are full.
+    /// Blocks have a multiple of this number where possible, so that all but the last are full.
     whole: usize,
     fits: &'a dyn Fn(&[u32]) -> bool,
 }
@@ -209,8 +209,8 @@ fn shared_memory(nodes: usize) -> usize {
     16 * GROUP as usize + 16 * MOST_OWN + 16 + 12 * nodes
 }
 
-/// Whether the shapes of cells at rest are found from the places of their nodes: those of linear tetrahedra
-/// that are full.
+/// True if the shapes of cells at rest are found from the places of their nodes. This holds for linear
+/// tetrahedra that are full.
 pub(crate) fn finds_shapes(cells: &Cells) -> bool {
     let Cells::Tet4(block) = cells else { return false };
     block.rest.iter().all(|rest| {
@@ -226,7 +226,7 @@ pub(crate) struct NodeBlocks {
     nodes: Vec<u32>,
     /// The cells of all blocks; those at borders are in several blocks.
     cells: Vec<u32>,
-    /// Their corners among the nodes of their block, in rows of all cells.
+    /// Corners of the cells among the nodes of their block, in rows of all cells.
     corners: Vec<u32>,
     /// Bits of a corner.
     corner_bits: usize,
@@ -235,11 +235,10 @@ pub(crate) struct NodeBlocks {
 }
 
 impl NodeBlocks {
-    /// Cuts each solid. A node of several solids is moved by the last of them, one of none by the last of
-    /// all.
+    /// Cuts each solid. The last solid at a node moves it; the last solid of all moves nodes without solids.
     ///
     /// # Errors
-    /// If what belongs to one node alone does not fit into the memory that a group shares.
+    /// If the data of one node do not fit into the memory that a group shares.
     pub(crate) fn of_solids(device: &Device, model: &Model) -> Result<Vec<Self>, GpuError> {
         let all = |solid: &Solid| (0..solid.cells.len() as u32).collect::<Vec<_>>();
         let mut nodes: Vec<_> =
@@ -268,7 +267,7 @@ impl NodeBlocks {
         solids.map(|((index, solid), nodes)| cut((index, solid, nodes))).collect()
     }
 
-    /// How many there are.
+    /// Returns the number of blocks.
     pub(crate) fn len(&self) -> usize {
         self.blocks.len()
     }

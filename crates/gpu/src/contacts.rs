@@ -1,6 +1,7 @@
 //! Contacts on the device: nodes and points between them as rows, found and solved there at every instant.
-//! Only the ways of obstacles and tools go up, with the factors of loads, and lists of candidates for pairs
-//! of surfaces when these are to be made anew. Leaves out: ideal grips of jaws, bodies of revolution.
+//! The CPU sends only the ways of obstacles and tools, with the factors of loads. It also sends lists of
+//! candidates for pairs of surfaces when these are to be made anew. Not available: ideal grips of jaws,
+//! bodies of revolution.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -23,7 +24,7 @@ use crate::pairs::DevicePairs;
 use crate::transfer::Four;
 use crate::{Device, GpuError, Kind};
 
-/// What of contacts runs on the CPU only, in words.
+/// Names a feature of the contacts that runs on the CPU only.
 pub fn processor_only(contacts: &Contacts) -> Option<String> {
     let grips = |rigid: &&Rigid| rigid.jaw.as_ref().is_some_and(|jaw| jaw.grip.is_some());
     let gripping =
@@ -65,7 +66,7 @@ struct Arrays {
     queue: wgpu::Buffer,
 }
 
-/// Which group of bindings contacts have.
+/// Group of bindings for contacts.
 const OWN_GROUP: usize = 2;
 
 /// The contacts of a model.
@@ -76,26 +77,26 @@ pub(crate) struct DeviceContacts {
     pub forces: wgpu::Buffer,
     /// The force [N] of each contact on its surface, four numbers each, once [`sum`](Self::sum) has run.
     pub sums: wgpu::Buffer,
-    /// What runs before the forces of cells are found: stops where candidates for pairs are to be listed
-    /// anew.
+    /// Kernel that runs before the forces of cells are found; it stops where candidates for pairs are to be
+    /// listed anew.
     pub before: Option<Kernel>,
-    /// What finds the forces on nodes, in order.
+    /// Kernels that find the forces on nodes, in order.
     pub kernels: Vec<Kernel>,
     /// Sums the forces of each contact.
     pub sum: Kernel,
     arrays: Arrays,
     pairs: Option<DevicePairs>,
-    /// Which of the kernels finds pairs.
+    /// Index of the kernel that finds pairs.
     finder: usize,
-    /// Fours of `rows` before those of pairs.
+    /// Vectors of four in `rows` before the rows of pairs.
     other_rows: usize,
 }
 
 impl DeviceContacts {
-    /// With `gather` and `gathered` how forces come from the cells.
+    /// Makes the contacts; `gather` and `gathered` collect forces from the cells.
     ///
     /// # Errors
-    /// If an array is too large, or the adapter allows fewer of them.
+    /// If an array is too large, or the adapter allows fewer arrays.
     pub(crate) fn new(
         (memory, device): (&Memory<'_>, &Device),
         instant: &Bound,
@@ -160,7 +161,7 @@ impl DeviceContacts {
         Ok(Self { contacts, forces, sums, before, kernels, sum, arrays, pairs, finder, other_rows })
     }
 
-    /// Whether bodies touch each other or themselves.
+    /// True if bodies touch each other or themselves.
     pub(crate) fn has_pairs(&self) -> bool {
         self.pairs.is_some()
     }
@@ -187,7 +188,7 @@ impl DeviceContacts {
     }
 }
 
-/// What all kernels of contacts begin with.
+/// Common beginning of all kernels of contacts.
 struct Source<'a> {
     device: &'a Device,
     constants: Vec<(&'a str, usize)>,
@@ -235,13 +236,13 @@ fn common(device: &Device, contacts: &Contacts, is_shared: bool, has_pairs: bool
     .join("\n")
 }
 
-/// Rows, with those of pairs.
+/// Makes the rows, including rows of pairs.
 fn rows(memory: &Memory<'_>, own: usize, pairs: Option<&DevicePairs>) -> Result<wgpu::Buffer, GpuError> {
     let of_pairs = pairs.map_or(0, |pairs| PAIR_ROW * pairs.most_rows);
     memory.zeros("the points that touch", (own + of_pairs) * size_of::<Four>())
 }
 
-/// What kernels of contacts work on, besides the nodes.
+/// Binds the arrays of kernels of contacts, besides the nodes.
 fn bound(
     device: &Device,
     nodes: &DeviceNodes,
@@ -265,8 +266,9 @@ fn bound(
     nodes.of_contacts(device, &own)
 }
 
-/// Invocations of the group that solves all rows. It waits after each colour and level; software changes from
-/// one part of a group to another there, and has one part only if the group fills one vector.
+/// Returns the invocations of the group that solves all rows. The group waits after each colour and level.
+/// Software changes from one part of a group to another there, and has one part only if the group fills one
+/// vector.
 fn solvers(device: &Device) -> usize {
     match device.adapter().kind {
         Kind::Software => 8,
@@ -289,7 +291,7 @@ const CONTACT: usize = 8;
 #[derive(Default)]
 struct Face {
     colour: usize,
-    /// Its contacts, each with its edges as [`FacePoints::edges`] has them.
+    /// Contacts of the face, each with its edges as [`FacePoints::edges`] has them.
     contacts: Vec<(usize, [bool; 3])>,
 }
 
@@ -301,7 +303,7 @@ struct Touched {
     first_point: usize,
     /// The contacts of each node.
     at_node: Vec<Vec<usize>>,
-    /// In the order of their colours.
+    /// Faces in the order of their colours.
     faces: Vec<([u32; 3], Face)>,
     /// Most points of a face, of each contact.
     points_of: Vec<usize>,
@@ -356,7 +358,7 @@ impl Touched {
     }
 }
 
-/// Where rows are.
+/// Places of rows.
 struct Places {
     /// Length of `rows`.
     rows: usize,
@@ -374,7 +376,7 @@ impl Places {
     }
 }
 
-/// What touching.wgsl reads.
+/// Arrays that touching.wgsl reads.
 struct Lists {
     surface: Vec<Four>,
     things: Vec<f32>,
@@ -388,7 +390,7 @@ struct Lists {
 }
 
 impl Lists {
-    /// Of the nodes that touch, and from where the ways of things begin in a row of the table.
+    /// Lists the nodes that touch; the ways of things begin at `passages` in a row of the table.
     fn new(contacts: &Contacts, nodes: Vec<u32>, rest: &[Vector<f64>], passages: usize) -> Self {
         let Touched { things, first_contact, first_point, at_node, faces, points_of } =
             Touched::new(contacts, &nodes, rest, passages);
@@ -456,7 +458,7 @@ impl Lists {
     }
 }
 
-/// Faces in the order of colours, so that those of a colour share no node: each takes the first one that is
+/// Sorts faces by colour, so that faces of a colour share no node. Each face takes the first colour that is
 /// free.
 fn coloured(faces: BTreeMap<[u32; 3], Face>, nodes: usize) -> Vec<([u32; 3], Face)> {
     let mut taken: Vec<Vec<usize>> = vec![Vec::new(); nodes];
@@ -474,7 +476,7 @@ fn coloured(faces: BTreeMap<[u32; 3], Face>, nodes: usize) -> Vec<([u32; 3], Fac
 mod tests {
     use super::*;
 
-    /// Around a point with many faces each has a colour of its own; others use these again.
+    /// The faces around a point have a colour each; other faces use these colours again.
     #[test]
     fn faces_of_a_colour_share_no_node() {
         let fan = (1..=7).map(|k| [0, k, k % 7 + 1]).chain([[8, 9, 10], [10, 11, 12]]);

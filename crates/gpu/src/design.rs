@@ -1,4 +1,4 @@
-//! How forces come from cells to nodes.
+//! Paths of forces from cells to nodes.
 
 use std::fmt;
 use std::str::FromStr;
@@ -14,20 +14,20 @@ pub enum Design {
     /// Cells write forces into slots of their own, nodes gather them in a fixed order. The same bits every
     /// time.
     Gather,
-    /// Blocks of neighbouring nodes do a step in one kernel: they find the forces of all cells at their nodes
-    /// in shared memory and move them. Cells at the borders of blocks are found by each. The same bits every
-    /// time, forces of a limited range.
+    /// Blocks of neighbouring nodes do a step in one kernel. They find the forces of all cells at their nodes
+    /// in shared memory and move the nodes. Cells at the borders of blocks are found by each block. The same
+    /// bits every time, forces of a limited range.
     Blocks,
-    /// Cells add their forces to those of the nodes by floating-point atomics, in any order: the last bits
-    /// vary from run to run.
+    /// Cells add their forces to the nodes by floating-point atomics, in any order: the last bits vary from
+    /// run to run.
     FloatAtomics,
-    /// Blocks of neighbouring cells add their forces up in shared memory, nodes gather the sums of their
-    /// blocks; shapes of plain tetrahedra at rest are found again from their nodes. The same bits every time.
+    /// Blocks of neighbouring cells add their forces up in shared memory, and nodes gather the sums of their
+    /// blocks. Shapes of plain tetrahedra at rest are found again from their nodes. The same bits every time.
     Fast,
 }
 
 impl Design {
-    /// All of them.
+    /// Every design.
     pub const ALL: &[Self] = &[Self::Gather, Self::Blocks, Self::FloatAtomics, Self::Fast];
 
     /// The default.

@@ -33,16 +33,16 @@ impl std::fmt::Display for Kind {
     }
 }
 
-/// An adapter and what matters of it.
+/// Adapter with its relevant properties.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Adapter {
-    /// Its name.
+    /// Name of the adapter.
     pub name: String,
     /// The adapter.
     pub kind: Kind,
     /// `vulkan`, `metal` or `dx12`.
     pub backend: String,
-    /// Its driver, with version.
+    /// Driver of the adapter, with version.
     pub driver: String,
     /// The largest array a kernel can work on [B].
     pub largest_buffer: u64,
@@ -78,7 +78,7 @@ impl Adapter {
     }
 }
 
-/// Those that can compute, the best first.
+/// Finds the adapters that can compute, the best first.
 fn found() -> (wgpu::Instance, Vec<(Adapter, wgpu::Adapter)>) {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
     descriptor.backends &= wgpu::Backends::PRIMARY;
@@ -92,7 +92,7 @@ fn found() -> (wgpu::Instance, Vec<(Adapter, wgpu::Adapter)>) {
     (instance, found)
 }
 
-/// All adapters, the best first.
+/// Lists all adapters, the best first.
 pub fn adapters() -> Vec<Adapter> {
     found().1.into_iter().map(|(adapter, _)| adapter).collect()
 }
@@ -110,13 +110,13 @@ pub struct Device {
     kernels: Arc<AtomicU64>,
 }
 
-/// What went wrong with a device since it was opened.
+/// Errors of a device since it was opened.
 #[derive(Clone, Debug)]
 struct Faults {
     adapter: String,
     /// The first thing: what follows are its consequences. Only that the device is lost explains all.
     first: Arc<Mutex<Option<GpuError>>>,
-    /// What the arrays of the last model take [B].
+    /// Size of the arrays of the last model [B].
     needed: Arc<AtomicU64>,
 }
 
@@ -145,7 +145,7 @@ impl Device {
     /// Opens the best adapter, or the best one whose name contains `name` (in any case of letters).
     ///
     /// # Errors
-    /// If there is none, or it can't be opened.
+    /// If there is no such adapter, or it can't be opened.
     pub fn open(name: Option<&str>) -> Result<Self, GpuError> {
         Self::open_within(name, |_, _| {})
     }
@@ -215,12 +215,12 @@ impl Device {
         (&self.device, &self.queue)
     }
 
-    /// Where it comes from: a window that draws what lies on the device needs both.
+    /// Returns the origin of the device: a window that draws its arrays needs both.
     pub fn origin(&self) -> (&wgpu::Instance, &wgpu::Adapter) {
         (&self.instance, &self.handle)
     }
 
-    /// The number of read-backs to ordinary memory since the device was opened, by any user of it.
+    /// Returns the number of read-backs to ordinary memory since the device was opened, by any user.
     pub fn read_backs(&self) -> u64 {
         self.read_backs.load(Ordering::Relaxed)
     }
@@ -229,7 +229,7 @@ impl Device {
         self.read_backs.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// The number of kernels compiled since the device was opened, for any user of it.
+    /// Returns the number of kernels compiled since the device was opened, for any user.
     pub fn kernels(&self) -> u64 {
         self.kernels.load(Ordering::Relaxed)
     }
@@ -264,7 +264,7 @@ impl Device {
     /// Runs `make`, which makes the arrays of a model; `needed` gives their bytes.
     ///
     /// # Errors
-    /// If the memory is full or the device fails; these errors take precedence over those of `make`.
+    /// If the memory is full or the device fails; these errors take precedence over errors of `make`.
     pub(crate) fn fill<T>(
         &self,
         needed: impl Fn() -> u64,
@@ -282,7 +282,7 @@ impl Device {
     }
 
     /// # Errors
-    /// If a kernel can't work on so many arrays, or in groups of so many invocations.
+    /// If a kernel can't work on `arrays` arrays, or in groups of `group` invocations.
     pub(crate) fn allows(&self, arrays: u32, group: u32) -> Result<(), GpuError> {
         let most = self.device.limits().max_storage_buffers_per_shader_stage;
         if most < arrays {

@@ -2,7 +2,7 @@
 
 use pliant_mechanics::model::Contradiction;
 
-/// Why a device can't be used, or not any longer.
+/// Reason why a device can't be used, or not any longer.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GpuError {
     /// No adapter was found.
@@ -21,7 +21,7 @@ pub enum GpuError {
     Refused {
         /// The adapter.
         adapter: String,
-        /// What the driver says.
+        /// Message of the driver.
         reason: String,
     },
     /// The device is gone: unplugged, reset, or stopped by a watchdog.
@@ -29,7 +29,7 @@ pub enum GpuError {
     Lost {
         /// The adapter.
         adapter: String,
-        /// What the driver says.
+        /// Message of the driver.
         reason: String,
     },
     /// The device's memory is full.
@@ -37,7 +37,7 @@ pub enum GpuError {
     OutOfMemory {
         /// The adapter.
         adapter: String,
-        /// What the arrays of the model take, as far as they were made [MiB].
+        /// Size of the arrays of the model, as far as they were made [MiB].
         needed: u64,
     },
     /// An array is larger than the adapter allows.
@@ -47,9 +47,9 @@ pub enum GpuError {
     TooLarge {
         /// The adapter.
         adapter: String,
-        /// What the array holds.
+        /// Contents of the array.
         what: &'static str,
-        /// Its size [B].
+        /// Size of the array [B].
         needed: u64,
         /// The most that is allowed [B].
         limit: u64,
@@ -59,7 +59,7 @@ pub enum GpuError {
     Lacks {
         /// The adapter.
         adapter: String,
-        /// What it lacks.
+        /// Missing feature.
         what: String,
     },
     /// The nodes around one node do not fit into the memory that a group of invocations shares.
@@ -73,7 +73,7 @@ pub enum GpuError {
         node: u32,
         /// Nodes of the elements there.
         neighbours: usize,
-        /// What they take [B].
+        /// Size of these nodes [B].
         needed: u64,
         /// The most that is allowed [B].
         limit: u64,
@@ -81,7 +81,7 @@ pub enum GpuError {
     /// Something that runs on the CPU only.
     #[error("{what} can't run on a GPU")]
     Unsupported {
-        /// What it is.
+        /// Name of the feature.
         what: String,
     },
     /// A design without contact.
@@ -112,13 +112,13 @@ pub enum GpuError {
     Internal {
         /// The adapter.
         adapter: String,
-        /// What the driver says.
+        /// Message of the driver.
         reason: String,
     },
 }
 
 impl GpuError {
-    /// Whether another model could run on the device.
+    /// True if another model could run on the device.
     pub fn is_about_the_model(&self) -> bool {
         matches!(
             self,
@@ -131,7 +131,7 @@ impl GpuError {
         )
     }
 
-    /// What to try.
+    /// Returns advice on what to try.
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::NoAdapter => {

@@ -1,14 +1,14 @@
-//! Conjugate gradients of implicit steps, in single precision: inverted blocks of the nodes, and with them
-//! rigid motions of aggregates.
+//! Conjugate gradients of implicit steps, in single precision, preconditioned by inverted blocks of the nodes
+//! and by rigid motions of aggregates.
 //!
 //! Kernels are compiled once; another pattern changes sizes and arrays. The CPU sends the lower half of the
-//! matrix; a kernel makes rows of blocks of it. The coarse matrix is inverted in full, pivot by pivot. An
-//! iteration takes four kernels (three without aggregates): A p; x, r and z = D⁻¹ r with the forces on
-//! aggregates; their motions; p. Sums are found group by group, and every group that needs a sum adds up
-//! those of the groups in the same order. The device itself decides where to stop: what was submitted after
-//! that does nothing. So bits depend on no number of submissions.
+//! matrix; a kernel makes rows of blocks from this half. The coarse matrix is inverted in full, pivot by
+//! pivot. An iteration takes four kernels (three without aggregates): A p; x, r and z = D⁻¹ r with the forces
+//! on aggregates; their motions; p. Sums are found group by group, and every group that needs a sum adds up
+//! the sums of the groups in the same order. The device itself decides where to stop: commands submitted
+//! after that do nothing. So bits depend on no number of submissions.
 //!
-//! `pliant-linear` takes what comes back as a correction under a residual in double precision.
+//! `pliant-linear` takes the result as a correction under a residual in double precision.
 
 use std::time::Instant;
 
@@ -59,7 +59,7 @@ fn failed(error: GpuError) -> DeviceError {
     DeviceError(format!("{error}; {}", error.remedy()))
 }
 
-/// How far a pass is, as its kernels see it; twin of progress.wgsl.
+/// Progress of a pass, as its kernels see it; twin of progress.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
 struct Progress {
@@ -73,7 +73,7 @@ struct Progress {
     unused: u32,
 }
 
-/// What belongs to a pattern, and a pivot; twin of sizes.wgsl.
+/// Sizes of a pattern, and a pivot; twin of sizes.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
 struct Sizes {
@@ -103,7 +103,7 @@ impl Sizes {
         }
     }
 
-    /// What all kernels read: these sizes with each pivot.
+    /// Binds the input of all kernels: these sizes with each pivot.
     fn bind(self, device: &Device, memory: &Memory<'_>) -> Bound {
         let place = |pivot: u32| {
             let mut place = [0_u32; PLACE / 4];
@@ -131,7 +131,7 @@ impl Sizes {
     }
 }
 
-/// What the kernels work on.
+/// Arrays of the kernels.
 struct Arrays {
     lower: Growing,
     source: Growing,
@@ -159,7 +159,7 @@ struct Arrays {
 }
 
 impl Arrays {
-    /// Of no pattern so far.
+    /// Makes arrays without a pattern.
     fn new(memory: &Memory<'_>) -> Result<Self, GpuError> {
         let new = |what| Growing::new(memory, what);
         let coarse = || new("the inverse of the aggregates");
@@ -190,7 +190,7 @@ impl Arrays {
         })
     }
 
-    /// Takes a pattern.
+    /// Sets the pattern.
     ///
     /// # Errors
     /// If an array is too large.
@@ -228,7 +228,7 @@ impl Arrays {
         Ok(())
     }
 
-    /// What each of the [`KERNELS`] works on, beside the sizes.
+    /// Binds the arrays of each of the [`KERNELS`], besides the sizes.
     fn bind(&self, device: &Device, sizes: Sizes) -> [Vec<Bound>; 7] {
         let bind = |bindings: &[Binding<'_>]| Bound::new(device, bindings);
         let read = |array| Binding::Read(Growing::buffer(array));
@@ -288,7 +288,7 @@ struct Gradients {
     /// Iterations of the last pass.
     last: usize,
     times: DeviceTimes,
-    /// Whether a pattern found no room.
+    /// True if a pattern found no room.
     torn: bool,
 }
 
@@ -378,7 +378,7 @@ impl Gradients {
         self.device.check()
     }
 
-    /// Whether the motions of aggregates are solved for.
+    /// True if the motions of aggregates are solved for.
     fn is_coarse(&self) -> bool {
         self.sizes.coarse != 0
     }
@@ -513,7 +513,7 @@ impl Upload {
         Self { staging }
     }
 
-    /// What fits in [B].
+    /// Returns the capacity [B].
     fn size(&self) -> u64 {
         self.staging.size()
     }

@@ -8,7 +8,7 @@ use crate::kernel::{Binding, Bound, GROUP, Kernel, Sides};
 use crate::transfer::Four;
 use crate::{Device, GpuError};
 
-/// What finds the forces of grips, and which nodes they pull at.
+/// Kernel that finds the forces of grips, and the nodes that they pull at.
 pub(crate) struct DeviceGrips {
     kernel: Kernel,
     /// Nodes that are pulled at, increasing, each once.
@@ -30,7 +30,7 @@ impl DeviceGrips {
         (!self.nodes.is_empty()).then_some(&self.kernel)
     }
 
-    /// Takes these grips; as instant.wgsl reads them.
+    /// Sets the grips. Returns them as instant.wgsl reads them.
     pub(crate) fn take(&mut self, model: &Model, grips: &[Grip]) -> Vec<Four> {
         let number = |n: usize| f32::from_bits(n as u32);
         self.kernel.dispatch_groups(grips.len() as u32);

@@ -10,7 +10,7 @@ use crate::{Device, GpuError};
 /// Invocations in a group.
 pub(crate) const GROUP: u32 = 128;
 
-/// Its name in kernels. One of the constants of a kernel may have this name and another number.
+/// Name of the group size in kernels. One of the constants of a kernel may have this name and another number.
 pub(crate) const GROUP_NAME: &str = "GROUP";
 
 /// Most groups along one dimension of a dispatch.
@@ -27,7 +27,7 @@ impl<'d> Memory<'d> {
         Self { device, bytes: Cell::new(0) }
     }
 
-    /// All arrays so far [B].
+    /// Returns the size of all arrays so far [B].
     pub(crate) fn bytes(&self) -> u64 {
         self.bytes.get()
     }
@@ -108,7 +108,7 @@ pub(crate) struct Growing {
 
 impl Growing {
     /// # Errors
-    /// As [`Memory::zeros`].
+    /// See [`Memory::zeros`].
     pub(crate) fn new(memory: &Memory<'_>, what: &'static str) -> Result<Self, GpuError> {
         Ok(Self { what, buffer: memory.zeros(what, 0)? })
     }
@@ -118,10 +118,10 @@ impl Growing {
         &self.buffer
     }
 
-    /// Has room for so many bytes; what it held is lost where it grows.
+    /// Makes room for `bytes` bytes; contents are lost if the array grows.
     ///
     /// # Errors
-    /// As [`Memory::zeros`].
+    /// See [`Memory::zeros`].
     pub(crate) fn reserve(&mut self, memory: &Memory<'_>, bytes: usize) -> Result<(), GpuError> {
         let needed = array_size(bytes);
         memory.count(self.what, needed)?;
@@ -143,16 +143,16 @@ impl Growing {
     }
 }
 
-/// What arrays are for.
+/// Usages of arrays.
 const ARRAY: BufferUsages = BufferUsages::STORAGE.union(BufferUsages::COPY_DST).union(BufferUsages::COPY_SRC);
 
-/// Bytes of an array, at least those of the largest element of any kernel: of a node that is held.
+/// Returns the bytes of an array, at least as many as the largest element of any kernel takes: a held node.
 fn array_size(bytes: usize) -> u64 {
     (bytes as u64).max(48).next_multiple_of(16)
 }
 
-/// Bytes of a buffer, a multiple of 16, that takes the place of a smaller one: half more, up to the largest
-/// that the adapter allows, or those needed.
+/// Returns the bytes of a buffer, a multiple of 16, that replaces a smaller one. The new buffer is half
+/// larger, up to the largest that the adapter allows, or has the bytes needed.
 pub(crate) fn grown(size: u64, needed: u64, largest: u64) -> u64 {
     let roomy = (size * 3 / 2).next_multiple_of(16);
     roomy.min(largest - largest % 16).max(needed.next_multiple_of(16))
@@ -167,19 +167,19 @@ pub(crate) type Sides = [wgpu::Buffer; 2];
 pub(crate) enum Binding<'a> {
     /// No kernel that is bound here uses this number.
     Nothing,
-    /// To read the side that is now.
+    /// Array whose present side is read.
     ReadNow(&'a Sides),
-    /// To read and write the side that is now.
+    /// Array whose present side is read and written.
     WriteNow(&'a Sides),
-    /// To write the other side.
+    /// Array whose other side is written.
     WriteNext(&'a Sides),
-    /// To read.
+    /// Array to read.
     Read(&'a wgpu::Buffer),
-    /// To read and write.
+    /// Array to read and write.
     Write(&'a wgpu::Buffer),
-    /// The same for all.
+    /// Uniform for all invocations.
     Uniform(&'a wgpu::Buffer),
-    /// The same for all, `size` bytes from an offset on that each dispatch gives.
+    /// Uniform for all invocations, `size` bytes from an offset on that each dispatch gives.
     Moving(&'a wgpu::Buffer, u64),
 }
 
@@ -196,7 +196,7 @@ impl<'a> Binding<'a> {
         Some(wgpu::BindingType::Buffer { ty, has_dynamic_offset, min_binding_size: None })
     }
 
-    /// What is bound where `side` is now.
+    /// Returns the resource to bind where `side` is now.
     fn resource(self, side: usize) -> Option<wgpu::BindingResource<'a>> {
         let buffer = match self {
             Self::Nothing => return None,
@@ -223,9 +223,9 @@ impl<'a> Binding<'a> {
 /// A group of bindings with its layout, in the order of their numbers.
 pub(crate) struct Bound {
     layout: wgpu::BindGroupLayout,
-    /// For each side that may be now.
+    /// Bind groups for each side that may be now.
     groups: [wgpu::BindGroup; 2],
-    /// How many arrays there are.
+    /// Number of arrays.
     arrays: u32,
 }
 
@@ -264,13 +264,13 @@ impl Bound {
 /// A kernel with the arrays it works on; group 0 is the instant's.
 pub(crate) struct Kernel {
     pipeline: wgpu::ComputePipeline,
-    /// For each side that may be now.
+    /// Bind groups for each side that may be now.
     bound: [Vec<wgpu::BindGroup>; 2],
     /// Groups of invocations along two dimensions.
     dispatch: [u32; 2],
 }
 
-/// How many groups a number of invocations fills, along two dimensions.
+/// Returns the groups that a number of invocations fills, along two dimensions.
 pub(crate) fn groups(invocations: usize) -> [u32; 2] {
     let groups = (invocations as u64).div_ceil(u64::from(GROUP)).max(1);
     let rows = groups.div_ceil(u64::from(MOST_GROUPS));
@@ -278,7 +278,7 @@ pub(crate) fn groups(invocations: usize) -> [u32; 2] {
 }
 
 impl Kernel {
-    /// From snippets of WGSL whose entry is `main`, with constants before them.
+    /// Makes a kernel from snippets of WGSL whose entry is `main`, with constants before them.
     ///
     /// # Errors
     /// If it works on more arrays, or in larger groups, than the adapter allows.
@@ -327,7 +327,7 @@ impl Kernel {
         Ok(Self { pipeline, bound, dispatch: groups(invocations) })
     }
 
-    /// Runs in so many groups from now on.
+    /// Runs in `count` groups from now on.
     pub(crate) fn dispatch_groups(&mut self, count: u32) {
         self.dispatch = [count, 1];
     }
@@ -339,7 +339,7 @@ impl Kernel {
         }
     }
 
-    /// Runs for so many invocations from now on.
+    /// Runs for `invocations` invocations from now on.
     pub(crate) fn resize(&mut self, invocations: usize) {
         self.dispatch = groups(invocations);
     }
@@ -361,9 +361,9 @@ impl Kernel {
 fn trusted(gpu: &wgpu::Device, name: &str, source: String) -> wgpu::ShaderModule {
     let source = wgpu::ShaderSource::Wgsl(source.into());
     let descriptor = wgpu::ShaderModuleDescriptor { label: Some(name), source };
-    // SAFETY: the text is Pliant's own. Loops end at counts, and places in arrays come from lists, that the
-    // CPU has made, or that kernels have made of them: queues of contact hold each row, face and node once
-    // and have room for all. No whole number is divided by zero.
+    // SAFETY: the text is Pliant's own. Loops end at counts, and places in arrays come from lists. The CPU
+    // has made these lists, or kernels have made them from such lists. Queues of contact hold each row, face
+    // and node once and have room for all. No whole number is divided by zero.
     unsafe { gpu.create_shader_module_trusted(descriptor, wgpu::ShaderRuntimeChecks::unchecked()) }
 }
 

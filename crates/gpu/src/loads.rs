@@ -18,11 +18,11 @@ const ALL: u32 = 0b111;
 pub(crate) struct DeviceLoads {
     /// Finds the forces of pressed faces.
     pub pressure: Option<Kernel>,
-    /// What kernels that move nodes read.
+    /// Arrays for kernels that move nodes.
     arrays: [wgpu::Buffer; 4],
 }
 
-/// Where a load acts: nodes of the model with weights.
+/// Returns the nodes of the model that a load acts on, with weights.
 fn weights(model: &Model, load: &Load, point: u32) -> Vec<(u32, f64)> {
     match load.surface {
         None => vec![(point, 1.0)],
@@ -159,7 +159,7 @@ impl DeviceLoads {
         Ok(Self { pressure, arrays: [offsets, entries, forces, bodies] })
     }
 
-    /// What loads.wgsl reads, in group 3.
+    /// Binds the arrays of loads.wgsl, in group 3.
     pub(crate) fn bindings(&self) -> [Binding<'_>; 4] {
         self.arrays.each_ref().map(Binding::Read)
     }

@@ -16,7 +16,7 @@ pub enum PointValue {
     /// The size of its displacement [m].
     #[default]
     Size,
-    /// What was given by [`DeviceMapping::give`].
+    /// Value given by [`DeviceMapping::give`].
     Given,
 }
 
@@ -29,7 +29,7 @@ pub struct DevicePoints {
 }
 
 impl DevicePoints {
-    /// Where they lie.
+    /// Returns the buffer of the points.
     pub fn buffer(&self) -> &wgpu::Buffer {
         &self.buffer
     }
@@ -51,7 +51,7 @@ impl DevicePoints {
     }
 }
 
-/// What finds points that are combinations of nodes.
+/// Kernel that finds points that are combinations of nodes.
 pub struct DeviceMapping {
     kernel: Kernel,
     shown: wgpu::Buffer,
@@ -61,7 +61,7 @@ pub struct DeviceMapping {
 }
 
 impl DeviceMapping {
-    /// Of points at rest [m] with the nodes and weights of each.
+    /// Maps points at rest [m], with the nodes and weights of each.
     ///
     /// # Errors
     /// If an array is too large, or the memory full.

@@ -28,9 +28,10 @@ pub(crate) const OF_NODE: usize = 3;
 /// The arrays of nodes.
 pub(crate) struct DeviceNodes {
     pub displacement: Sides,
-    /// Of each node its increment, and the internal forces at the last two instants.
+    /// Increment of each node, and the internal forces at the last two instants.
     pub increment: Sides,
-    /// The same with the coming increments; where sides alternate they lie where the increments will be.
+    /// Coming increment of each node, and internal forces; where sides alternate they lie where the
+    /// increments will be.
     pub next: Sides,
     pub reactions: wgpu::Buffer,
     pub sums: wgpu::Buffer,
@@ -38,9 +39,9 @@ pub(crate) struct DeviceNodes {
     holds: wgpu::Buffer,
     /// The nodes that are held, in the order of `reactions`.
     pub held: Vec<u32>,
-    /// Those that follow others.
+    /// Nodes that follow others.
     pub followers: Option<Followers>,
-    /// How many nodes there are.
+    /// Number of nodes.
     pub count: usize,
     /// Groups that leave sums: of the pass over them, or of blocks.
     pub groups: usize,
@@ -55,7 +56,8 @@ pub(crate) struct NodeKernels {
 }
 
 impl DeviceNodes {
-    /// With `blocks` that move nodes from one side to the other, if there are some.
+    /// Makes the arrays; `blocks` is the number of blocks that move nodes from one side to the other, if
+    /// there are some.
     ///
     /// # Errors
     /// If an array is too large.
@@ -172,7 +174,7 @@ impl DeviceNodes {
         }
     }
 
-    /// What contacts work on, with what is their own.
+    /// Binds the arrays of nodes that contacts work on, with the contacts' own arrays.
     pub(crate) fn of_contacts(&self, device: &Device, own: &[Binding<'_>]) -> Bound {
         let bindings = [
             Binding::ReadNow(&self.displacement),
@@ -187,7 +189,7 @@ impl DeviceNodes {
         Bound::new(device, &[&bindings[..], own].concat())
     }
 
-    /// What blocks of nodes work on, with `left` the forces that they leave.
+    /// Binds the arrays of blocks of nodes; `left` has the forces that blocks leave.
     pub(crate) fn of_blocks(&self, device: &Device, left: &wgpu::Buffer) -> Bound {
         let bindings = [
             Binding::ReadNow(&self.displacement),
@@ -208,15 +210,15 @@ const INSTANT: &str = include_str!("shaders/instant.wgsl");
 /// Marks a node that a grip pulls at; twin of the one in move.wgsl.
 const GRIPPED: u32 = 1 << 31;
 
-/// What resists and holds nodes.
+/// Inertia and constraints of nodes.
 pub(crate) const MOVE: &str = include_str!("shaders/move.wgsl");
 /// The coming increment of a node.
 pub(crate) const MOTION: &str = include_str!("shaders/central_difference.wgsl");
 
-/// Without contacts.
+/// Shader of nodes without contacts.
 pub(crate) const UNTOUCHED: &str = include_str!("shaders/untouched.wgsl");
 
-/// What acts on nodes from outside.
+/// Returns the shader of the forces on nodes from outside.
 pub(crate) fn external_forces(loads: Option<&DeviceLoads>) -> &'static str {
     match loads {
         Some(_) => include_str!("shaders/loads.wgsl"),

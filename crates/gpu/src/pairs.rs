@@ -1,6 +1,6 @@
-//! Candidates for pairs of points of surfaces: listed in ordinary memory from places that are read back,
-//! whenever the device stops because nodes have left the skin of the lists. Results depend neither on when
-//! they are made nor on when the device was looked at.
+//! Candidates for pairs of points of surfaces. They are listed in ordinary memory from places that are read
+//! back, whenever the device stops because nodes have left the skin of the lists. Results depend neither on
+//! when lists are made nor on when the device was looked at.
 
 use nalgebra::Vector3;
 use pliant_contact::pairs::Pairs;
@@ -17,7 +17,7 @@ const OF_CONTACT: usize = 9;
 /// Longer arrays than needed are made, so that few lists ask for others.
 const SPARE: usize = 2;
 
-/// What a node may go where nothing can be listed [m].
+/// Distance [m] that a node may go where nothing can be listed.
 const ANYWHERE: f32 = 1e30;
 
 /// The pairs of bodies of a model.
@@ -25,15 +25,15 @@ pub(crate) struct DevicePairs {
     /// The contact of each, its lists, and the sign of its forces.
     own: Vec<(usize, Pairs, f64)>,
     touches: Vec<Touch>,
-    /// Where the nodes that touch are at rest [m], by their own numbers, and their numbers in the model.
+    /// Places [m] at rest of the nodes that touch, by their own numbers, and their numbers in the model.
     rest: Vec<Vector3<f64>>,
     nodes: Vec<u32>,
-    /// Which of them have pairs.
+    /// True for nodes that have pairs.
     watched: Vec<bool>,
-    /// What pairs.wgsl reads.
+    /// Arrays that pairs.wgsl reads.
     pub candidates: wgpu::Buffer,
     pub listed: wgpu::Buffer,
-    /// What kernels need to order them.
+    /// Scratch with which kernels order pairs.
     pub queue: wgpu::Buffer,
     /// Rows that `queue` has room for.
     pub most_rows: usize,
@@ -44,8 +44,8 @@ pub(crate) struct DevicePairs {
 }
 
 impl DevicePairs {
-    /// Those of contacts of bodies, if there are any; `nodes` touch something, and `rest` is where all nodes
-    /// of the model are at rest [m].
+    /// Makes the pairs of contacts between bodies, if there are any. `nodes` touch something, and `rest` has
+    /// the places [m] at rest of all nodes of the model.
     ///
     /// # Errors
     /// If an array is too large.
@@ -109,7 +109,7 @@ impl DevicePairs {
         let Self { own, touches, rest, watched, numbers, places, .. } = self;
         places.clear();
         if !moved.iter().flatten().all(|x| x.is_finite()) {
-            // The device finds what is wrong.
+            // The device finds the error.
             let free =
                 |(&[x, y, z, _], &watched): (&Four, &bool)| [x, y, z, if watched { ANYWHERE } else { 0.0 }];
             places.extend(moved.iter().zip(watched.iter()).map(free));
@@ -189,8 +189,8 @@ impl DevicePairs {
         (self.numbers.len() - self.numbers[4] as usize) / 5
     }
 
-    /// Makes larger arrays if these are too small for the lists; whether it did. Tells kernels how many rows
-    /// there can be.
+    /// Makes larger arrays if these are too small for the lists, and returns true then. Also sets the most
+    /// rows for the kernels.
     fn grow(&mut self, memory: &Memory<'_>) -> Result<bool, GpuError> {
         let bytes = size_of_val(&self.numbers[..]);
         let rows = self.rows();

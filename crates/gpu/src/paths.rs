@@ -1,12 +1,13 @@
 //! The way forces take from cells to nodes, for each design.
 //!
-//! What an elastic `tet4` moves and computes in a step, counted from the arrays below for six cells a node,
-//! each number read once from memory; operations are those of a prototype's PTX (sm_90, neo-Hookean). The
-//! node itself (u, Δu read and written, its constants) is 80 B, 13 a cell. Times are in `docs/lab/`.
+//! The table counts the bytes and operations of an elastic `tet4` in a step. Bytes follow from the arrays
+//! below for six cells a node, each number read once from memory. Operations are counted in a prototype's PTX
+//! (sm_90, neo-Hookean). The node itself (u, Δu read and written, its constants) is 80 B, 13 a cell. Times
+//! are in docs/lab/performance.md.
 //!
 //! | design | bytes | operations | where they go |
 //! |---|---|---|---|
-//! | `gather` | 230 | 260 | cell: nodes 16, shape 48, u 3, forces written 64; node: forces 64, their places 17 |
+//! | `gather` | 230 | 260 | cell: nodes 16, shape 48, u 3, forces written 64; node: forces 64, places 17 |
 //! | `blocks` | 120 | 475 | 1.78 × (shape 48, corners 4), 3.4 × nodes around 11; no second kernel |
 //! | `float-atomics` | 90 | 260 | nodes 16, shape 48, u 3, sums 8; twelve atomic additions |
 //! | `fast` | 50 | 325 | corners 4, places of corners 14, 2.0 × nodes of blocks 20; shapes found again |
@@ -23,32 +24,32 @@ use crate::ties::{Followers, Giving};
 use crate::transfer::Four;
 use crate::{Design, Device, GpuError};
 
-/// Takes displacements from where they lie.
+/// Shader that reads displacements where they lie.
 pub(crate) const CORNERS: &str = include_str!("shaders/cell_corners.wgsl");
 /// The entry of a kernel of which each invocation takes a cell.
 pub(crate) const EACH_CELL: &str = include_str!("shaders/each_cell.wgsl");
 /// Forces as whole numbers.
 const FIXED: &str = include_str!("shaders/fixed.wgsl");
 
-/// Where cells give forces and nodes take them.
+/// Arrays into which cells give forces, and from which nodes take them.
 pub(crate) struct Paths {
-    /// What kernels of cells read and write.
+    /// Arrays that kernels of cells read and write.
     pub cells: Bound,
-    /// Their snippet: `displacement_of`, `give` and the entry.
+    /// Shader snippet of cells: `displacement_of`, `give` and the entry.
     pub cell_snippet: String,
-    /// What the passes over nodes read.
+    /// Arrays that the passes over nodes read.
     pub nodes: Bound,
-    /// Their snippet: `internal_force` and `clear`.
+    /// Shader snippet of nodes: `internal_force` and `clear`.
     pub node_snippet: String,
-    /// How forces on nodes that follow others go on, if there are any.
+    /// Path of forces on nodes that follow others, if there are any.
     pub giving: Option<Giving>,
     /// First slot of each solid.
     pub first_slot: Vec<usize>,
     /// Blocks of each solid, if the design has some.
     pub blocks: Vec<DeviceBlocks>,
-    /// Whether blocks have the shapes of plain tetrahedra at rest found again from the places of their nodes.
+    /// True if blocks find the shapes of plain tetrahedra at rest again from the places of their nodes.
     pub finds_shapes: bool,
-    /// Whether kernels of cells move the nodes, too.
+    /// True if kernels of cells move the nodes, too.
     pub moves: bool,
     /// Constants of kernels of cells.
     pub constants: Vec<(&'static str, usize)>,
@@ -57,7 +58,7 @@ pub(crate) struct Paths {
 }
 
 impl Paths {
-    /// With what the nodes are cut into, where the design does so.
+    /// Makes the paths of a design; `cut` has the blocks of nodes if the design cuts them.
     ///
     /// # Errors
     /// If an array is too large, or the device lacks what the design needs.
@@ -83,9 +84,9 @@ impl Paths {
         }
     }
 
-    /// One kernel a step. Of the forces of a block only whole numbers are kept, 16 bytes a node: in shared
-    /// memory every GPU adds them natively, in any order to the same sum. Slots to gather them from would
-    /// take 48 bytes or more a cell there, which makes blocks smaller and cells at borders more.
+    /// One kernel a step. The forces of a block are kept only as whole numbers, 16 bytes a node. In shared
+    /// memory every GPU adds them natively, in any order to the same sum. Slots to gather forces would take
+    /// 48 bytes or more a cell there. This makes blocks smaller and cells at borders more.
     fn blocks(
         memory: &Memory<'_>,
         device: &Device,
@@ -173,7 +174,8 @@ impl Paths {
         })
     }
 
-    /// From slots with their nodes, which gather them; what the slots and their lists are in words.
+    /// Makes paths from slots with their nodes, which gather them. `what` and `lists` describe the slots and
+    /// their lists in words.
     fn of_slots(
         memory: &Memory<'_>,
         device: &Device,
@@ -238,7 +240,7 @@ impl Paths {
         })
     }
 
-    /// Begins at zero.
+    /// Sets the sums to zero.
     pub(crate) fn clear(&self, device: &Device) {
         if let Some(sums) = &self.sums {
             let mut encoder = device.device.create_command_encoder(&Default::default());
@@ -248,9 +250,9 @@ impl Paths {
     }
 }
 
-/// The units of forces and energies that are added up as whole numbers of 32 bits. A cell gives at most 2³¹
-/// over the most cells at a node, so that no sum leaves the range; that much is the force of the stiffest
-/// cell at a strain of 1, V (λ+2μ) |B|. What is more is cut off and reported.
+/// Units of forces and energies that are added up as whole numbers of 32 bits. A cell gives at most 2³¹ over
+/// the most cells at a node, so that no sum leaves the range. This limit stands for the force of the stiffest
+/// cell at a strain of 1, V (λ+2μ) |B|. Larger numbers are cut off and reported.
 struct Scale {
     limit: f32,
     per_force: f32,
@@ -298,8 +300,8 @@ fn force_at_unit_strain(solid: &Solid, cell: usize) -> f64 {
     area * solid.longitudinal_modulus()
 }
 
-/// First entry of each of so many rows, and the entries of the rows in their order, from entries with their
-/// rows.
+/// Returns the first entry of each of `rows` rows, and the entries of the rows in their order, from entries
+/// with their rows.
 pub(crate) fn by_rows<T: Copy + Default>(
     rows: usize,
     entries: impl Iterator<Item = (u32, T)> + Clone,

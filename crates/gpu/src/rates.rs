@@ -1,7 +1,7 @@
 //! Peak rates of a device, measured: copies, multiply-adds, and kernel launches.
 //!
-//! A chain of the same kernel is submitted again and again, longer and longer until it takes [`ENOUGH`]; the
-//! best of the repeats counts, since other work can only slow it down.
+//! A chain of the same kernel is submitted again and again, longer and longer until it takes [`ENOUGH`]. The
+//! best of the repeats counts, since other work can only slow a chain down.
 
 use std::time::{Duration, Instant};
 
@@ -14,7 +14,7 @@ const COPIED: u64 = 256 << 20;
 const INVOCATIONS: usize = 1 << 18;
 /// Rounds of each: eight multiply-adds on four numbers.
 const ROUNDS: usize = 64;
-/// How long a chain has to take.
+/// Least duration of a chain.
 const ENOUGH: Duration = Duration::from_millis(30);
 /// The longest chain in a submission.
 const LONGEST: usize = 1 << 14;
@@ -31,7 +31,7 @@ pub struct DeviceRates {
 }
 
 impl DeviceRates {
-    /// Measures so many times.
+    /// Measures the rates `repeats` times.
     ///
     /// # Errors
     /// If the device fails.

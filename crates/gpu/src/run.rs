@@ -22,12 +22,12 @@ const MOST: usize = 128;
 /// seconds.
 const LONGEST_SUBMISSION: f64 = 0.2;
 
-/// How many instants a submission takes, by the time [s] that one takes, once it is known.
+/// Returns the number of instants in a submission, by the time [s] of one instant, once known.
 pub(crate) fn room(pace: Option<f64>) -> usize {
     pace.map_or(16.0, |pace| LONGEST_SUBMISSION / pace).clamp(1.0, MOST as f64) as usize
 }
 
-/// Why steps could not be taken.
+/// Reason why steps could not be taken.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum StepFailure {
     /// The run has come to an end.
@@ -39,7 +39,7 @@ pub enum StepFailure {
 }
 
 impl StepFailure {
-    /// What to try.
+    /// Returns advice on what to try.
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::Step(error) => error.remedy(),
@@ -48,7 +48,7 @@ impl StepFailure {
     }
 }
 
-/// What kernels do at an instant.
+/// Actions of kernels at an instant.
 pub(crate) mod flags {
     pub(crate) const MOVES: u32 = 1;
     pub(crate) const MEASURES: u32 = 2;
@@ -99,7 +99,7 @@ impl Instant {
     }
 }
 
-/// Instants of the next submission, each with its row of a table of what is found in double precision on the
+/// Instants of the next submission, each with its row of a table of numbers found in double precision on the
 /// CPU.
 pub(crate) struct Rows<I> {
     instants: wgpu::Buffer,
@@ -115,7 +115,7 @@ pub(crate) struct Rows<I> {
 }
 
 impl<I: Pod> Rows<I> {
-    /// With so many numbers in a row.
+    /// Makes rows of `stride` numbers.
     ///
     /// # Errors
     /// If the table is too large.
@@ -154,7 +154,7 @@ impl<I: Pod> Rows<I> {
         self.count += 1;
     }
 
-    /// How many there are.
+    /// Returns the number of instants.
     pub(crate) fn len(&self) -> usize {
         self.count
     }
@@ -184,7 +184,7 @@ impl<I: Pod> Rows<I> {
 /// Instants of solids, with the factors of constraints and loads, and the ways of obstacles and tools, at
 /// each.
 pub(crate) struct Instants {
-    /// What all kernels read.
+    /// Bindings that all kernels read.
     pub bound: Bound,
     rows: Rows<Instant>,
     pub findings: wgpu::Buffer,
@@ -199,15 +199,15 @@ pub(crate) fn table_constants(model: &Model) -> [(&'static str, usize); 3] {
     [("LOADS", loads), ("GRAVITY", gravity), ("PASSAGES", gravity + 3 * model.bodies.len())]
 }
 
-/// What all kernels read.
+/// Makes the bindings that all kernels read.
 fn bind(device: &Device, rows: &Rows<Instant>, findings: &wgpu::Buffer, grips: &wgpu::Buffer) -> Bound {
     Bound::new(device, &[rows.instant(), Binding::Write(findings), rows.table(), Binding::Write(grips)])
 }
 
-/// What is found at all instants, before any.
+/// Findings before any instant.
 const NOTHING: [u32; 5] = [u32::MAX, u32::MAX, f32::to_bits(1.0), 0, u32::MAX];
 
-/// Where in the findings the first instant is that waits for lists of candidates for contact.
+/// Entry of the findings with the first instant that waits for lists of candidates for contact.
 pub(crate) const UNLISTED: usize = 4;
 
 impl Instants {
@@ -228,7 +228,7 @@ impl Instants {
         Ok(Self { bound, rows, findings, grips, contacts })
     }
 
-    /// Takes grips as instant.wgsl reads them.
+    /// Sets the grips, in the form that instant.wgsl reads.
     ///
     /// # Errors
     /// If there are too many.
@@ -252,7 +252,7 @@ impl Instants {
         device.queue.write_buffer(&self.findings, 8, bytemuck::cast_slice(&NOTHING[2..UNLISTED]));
     }
 
-    /// Goes on where candidates for contact were to be listed anew.
+    /// Continues where candidates for contact were to be listed anew.
     pub(crate) fn go_on(&self, device: &Device) {
         let place = (UNLISTED * size_of::<u32>()) as u64;
         device.queue.write_buffer(&self.findings, place, bytemuck::cast_slice(&NOTHING[UNLISTED..]));
@@ -292,7 +292,7 @@ impl Instants {
         rows.push(|row| Instant { row, ..instant }, fill);
     }
 
-    /// How many there are.
+    /// Returns the number of instants.
     pub(crate) fn len(&self) -> usize {
         self.rows.len()
     }

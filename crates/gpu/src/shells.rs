@@ -1,14 +1,14 @@
 //! Explicit shells on a device: the central differences of `pliant_implicit::ExplicitShells` in single
 //! precision.
 //!
-//! Two kernels a step. A facet finds the forces on its corners, and those of pressure. A node sums those of
+//! Two kernels a step. A facet finds the forces on its corners, including pressure. A node sums the forces of
 //! its corners in the order of the facets, adds its loads and moves. The state on the device is
 //! displacements, rotations, velocities and spins. Factors of loads and velocities of moved nodes are found
 //! in double precision on the CPU, and are rows of a table, one per instant.
 //!
-//! Leaves out what [`GpuShells::unsupported`] names, and energies and reactions: the CPU finds these from a
-//! state that is read back. The work of forces from outside is summed on the device, so none of it is lost in
-//! between.
+//! Not available: features that [`GpuShells::unsupported`] names, and energies and reactions: the CPU finds
+//! these from a state that is read back. The work of forces from outside is summed on the device, so none of
+//! it is lost in between.
 
 use std::sync::Arc;
 use std::time::Instant as Clock;
@@ -42,7 +42,7 @@ struct Instant {
     step: f32,
 }
 
-/// What [`GpuShells::advance`] has done.
+/// Result of [`GpuShells::advance`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShellsMoved {
     /// Steps taken.
@@ -50,8 +50,8 @@ pub struct ShellsMoved {
     /// Work [J] of forces from outside on the way, by the trapezoidal rule, less what those at the end do:
     /// half of their power × step.
     pub work: f64,
-    /// Whether a facet was broken, in single precision, before all steps were taken. The state is that of
-    /// this instant; the CPU's forces there tell whether it is, and name it.
+    /// True if a facet was broken, in single precision, before all steps were taken. The state is then the
+    /// state at this instant; the CPU's forces there decide if a facet is broken, and name it.
     pub broken: bool,
 }
 
@@ -68,7 +68,7 @@ pub struct GpuShells {
     places: wgpu::Buffer,
     rates: wgpu::Buffer,
     pushes: wgpu::Buffer,
-    /// Whether any node is pushed.
+    /// True if any node is pushed.
     pushed: bool,
     facets: Kernel,
     nodes: Kernel,
@@ -81,10 +81,10 @@ pub struct GpuShells {
 /// A node that a constraint moves.
 struct Moved {
     constraint: usize,
-    /// Its place among the nodes of the constraint.
+    /// Index of the node in the constraint.
     index: usize,
     components: [bool; 6],
-    /// Where its six numbers are in a row of the table.
+    /// Place of its six numbers in a row of the table.
     place: usize,
 }
 
@@ -103,7 +103,7 @@ impl GpuShells {
         device.fill(|| memory.bytes(), || Self::on_device(device, &memory, model, step))
     }
 
-    /// What of a model explicit shells on a device do not have, in words.
+    /// Names a feature of a model that explicit shells on a device do not have.
     pub fn unsupported(model: &Assembly) -> Option<String> {
         if let Some(constraint) = model.collective() {
             return Some(format!("the constraint `{}`, which binds nodes to each other,", constraint.name));
@@ -170,7 +170,7 @@ impl GpuShells {
         self.step
     }
 
-    /// Takes up another state than the one it has come to.
+    /// Uploads another state than the present one.
     pub fn upload(&mut self, state: &State) {
         let four = |v: &Vector3<f64>| [v.x as f32, v.y as f32, v.z as f32, 0.0];
         let places: Vec<[Four; 2]> = (state.position.iter().zip(&state.rotation).enumerate())
@@ -186,8 +186,8 @@ impl GpuShells {
         self.loaded = true;
     }
 
-    /// Takes forces [N] on nodes: they and no others act from the next step on, as loads beside those of the
-    /// model.
+    /// Replaces the forces [N] on nodes from outside. Only these act from the next step on, in addition to
+    /// the loads of the model.
     pub fn push(&mut self, forces: &[(u32, [f64; 3])]) {
         if forces.is_empty() && !self.pushed {
             return;
@@ -272,7 +272,7 @@ impl GpuShells {
         self.transfer.read_all(&self.device, &arrays, |parts| {
             read.0 = bytemuck::cast_slice::<u8, u32>(parts[2])[0];
             if read.0 == 0 {
-                // Nothing has moved: the state keeps its digits, and the sums are those of the call before.
+                // Nothing has moved: the state keeps its digits, and the sums are those from the call before.
                 return;
             }
             let three = |v: Four| Vector3::new(v[0], v[1], v[2]).map(f64::from);
@@ -290,7 +290,7 @@ impl GpuShells {
     }
 }
 
-/// What both kernels are made of.
+/// Common input of both kernels.
 struct Kernels<'a> {
     memory: &'a Memory<'a>,
     device: &'a Device,
@@ -303,13 +303,13 @@ struct Kernels<'a> {
 /// The kernel of facets, and the forces that it finds.
 struct FacetForces {
     kernel: Kernel,
-    /// On the corners.
+    /// Forces on the corners.
     forces: wgpu::Buffer,
     pressed: Option<Pressed>,
 }
 
 impl Kernels<'_> {
-    /// A kernel that works on its own arrays and, where there are pressures, on these.
+    /// Makes a kernel that works on its own arrays and, where there are pressures, on `pressure`.
     fn kernel(
         &self,
         name: &str,
@@ -415,7 +415,7 @@ fn moved_nodes(model: &Assembly) -> (Vec<Moved>, Vec<u32>) {
     (moved, places)
 }
 
-/// What facets have at rest, number by number.
+/// Returns the constants of facets at rest, number by number.
 fn at_rest(model: &Assembly) -> Vec<f32> {
     let facets = model.facets.len();
     let mut numbers = vec![0.0; AT_REST * facets];
@@ -435,7 +435,7 @@ fn at_rest(model: &Assembly) -> Vec<f32> {
     numbers
 }
 
-/// What the velocity of each node becomes, and which components are held.
+/// Returns the factors of the velocity of each node, and bits of the held components.
 fn kinds(model: &Assembly, step: f64) -> Vec<Four> {
     let mut held: Vec<u32> = model.turning().into_iter().map(|turns| if turns { 0 } else { 56 }).collect();
     for constraint in &model.constraints {
@@ -479,7 +479,7 @@ fn nodal_loads(model: &Assembly) -> impl Iterator<Item = (u32, [Four; 2])> + Clo
     })
 }
 
-/// Pressures on facets, and the forces that come of them.
+/// Pressures on facets, and their forces.
 struct Pressed {
     bound: Bound,
     given: wgpu::Buffer,
@@ -525,8 +525,8 @@ impl Pressed {
     }
 }
 
-/// Of each corner its normal at rest in the axes of its facet; with the first the control points on straight
-/// edges, as bits.
+/// Returns the normal of each corner at rest in the axes of its facet. The first normal also has the control
+/// points on straight edges, as bits.
 fn normals(model: &Assembly) -> Vec<[Four; 3]> {
     let (surface, rest) = (CurvedSurface::new(model, EdgeRule::Arc), State::at_rest(model));
     let of_facet = |(number, facet): (u32, &pliant_shells::Facet)| {

@@ -22,7 +22,7 @@ pub(crate) fn rows_of_series(solid: &Solid) -> usize {
     1 + solid.material.prony.isochoric.len() + solid.material.prony.volumetric.len()
 }
 
-/// Constants of the kernels of a solid whose law has so many rows of parameters.
+/// Constants of the kernels of a solid whose law has `parameters` rows of parameters.
 pub(crate) fn constants_of(
     solid: &Solid,
     parameters: usize,
@@ -43,14 +43,14 @@ pub(crate) fn constants_of(
     ]
 }
 
-/// Whether the hourglass stiffness of a solid grows: 0 if not, 1 of a law with an energy of the volume alone,
-/// 2 of others.
+/// Returns the kind of growth of a solid's hourglass stiffness: 0 without growth, 1 for a law with an energy
+/// of the volume alone, 2 for others.
 fn hourglass_grows(solid: &Solid) -> usize {
     let kind = if solid.material.law.has_volumetric_energy() { 1 } else { 2 };
     solid.hourglass_growth().map_or(0, |_| kind)
 }
 
-/// What the kernels of a solid are made of.
+/// Input of the kernels of a solid.
 pub(crate) struct SolidKernels<'a> {
     pub device: &'a Device,
     pub paths: &'a Paths,
@@ -63,15 +63,15 @@ pub(crate) struct SolidKernels<'a> {
     pub count: usize,
     /// Nodes over which pressures are averaged.
     pub local_nodes: usize,
-    /// Whether shapes at rest are found again from the places of nodes.
+    /// True if shapes at rest are found again from the places of nodes.
     pub finds_shapes: bool,
     /// Constants of the solid.
     pub constants: Vec<(&'static str, usize)>,
-    /// What all kernels of an instant read.
+    /// Bindings that all kernels of an instant read.
     pub instant: &'a Bound,
-    /// What kernels of forces read and write.
+    /// Bindings of kernels of forces.
     pub bound: &'a Bound,
-    /// What kernels of averages read and write.
+    /// Bindings of kernels of averages.
     pub averaging: &'a Bound,
 }
 

@@ -57,9 +57,9 @@ fn pressure_order(cells: &Cells, order: &[u32]) -> Vec<u32> {
 
 /// A solid on the device.
 pub(crate) struct DeviceSolid {
-    /// In the order they run.
+    /// Kernels in the order they run.
     kernels: Vec<Kernel>,
-    /// What relaxing laws remember of cells and of averaged pressures.
+    /// History of relaxing laws, for cells and for averaged pressures.
     histories: [wgpu::Buffer; 2],
     /// The order of cells and of averaged pressures on the device, by their numbers in the solid; some lie
     /// there several times.
@@ -68,7 +68,7 @@ pub(crate) struct DeviceSolid {
     packs: [usize; 2],
     /// Parameters of the law, then coefficients of relaxation.
     constants: wgpu::Buffer,
-    /// Where the coefficients begin [B].
+    /// Offset of the coefficients [B].
     series: u64,
 }
 
@@ -165,7 +165,7 @@ impl DeviceSolid {
         &self.kernels
     }
 
-    /// Takes up the history of a state.
+    /// Uploads the history of a state.
     pub(crate) fn upload(&self, device: &Device, history: &History<f32>) {
         for (index, packs) in [&history.cells, &history.pressures].into_iter().enumerate() {
             let mut numbers = vec![0.0_f32; self.numbers(index)];
@@ -174,7 +174,7 @@ impl DeviceSolid {
         }
     }
 
-    /// Brings the history back; that of all copies of a cell is the same.
+    /// Brings the history back; all copies of a cell have the same history.
     ///
     /// # Errors
     /// If the device fails.
@@ -212,7 +212,7 @@ impl DeviceSolid {
     }
 }
 
-/// Nodes, four to a row of all cells; that of a triangle is filled up.
+/// Returns the nodes, four to a row of all cells; a triangle repeats its last node.
 fn rows_of_nodes(cells: &Cells, order: &[u32]) -> Vec<[u32; 4]> {
     let last = cells.nodes_per_cell() - 1;
     let row = |row: usize| {
@@ -226,7 +226,7 @@ fn reach(square: f64) -> f64 {
     (1.5 * square).min(1e30)
 }
 
-/// What the element needs of the shape at rest, row by row of all cells.
+/// Returns the constants of the element at rest, row by row of all cells.
 fn rows_at_rest(solid: &Solid, order: &[u32]) -> Vec<Four> {
     let (cells, law) = (&solid.cells, &solid.material.law);
     let rows = |count: usize, of_cell: &dyn Fn(usize, usize) -> Four| {
@@ -300,7 +300,7 @@ fn rows_of_fibres(solid: &Solid, order: &[u32]) -> Vec<Four> {
     (0..solid.material.law.families()).flat_map(row).collect()
 }
 
-/// What averaging over the nodes of a solid needs.
+/// Arrays for averages over the nodes of a solid.
 struct Averages {
     /// Nodes of the solid.
     count: usize,
@@ -339,12 +339,12 @@ impl Averages {
         })
     }
 
-    /// What elements read that take the means of their nodes.
+    /// Returns the bindings of elements that take the means of their nodes.
     fn means(&self) -> [Binding<'_>; 3] {
         [Binding::Nothing, Binding::Write(&self.node_values), Binding::Read(&self.nodes)]
     }
 
-    /// What finds these means.
+    /// Returns the bindings of kernels that find these means.
     fn bindings<'a>(&'a self, pressures: &'a wgpu::Buffer) -> [Binding<'a>; 7] {
         [
             Binding::Write(&self.cell_values),

@@ -1,6 +1,6 @@
-//! Nodes on the device that follow others: they are taken along after each motion, and the forces of their
-//! cells go to the nodes that they follow, by the rows of `pliant_mechanics::tie`. Masses have gone there
-//! when the model was made.
+//! Nodes on the device that follow others. They are taken along after each motion. The forces of their cells
+//! go to the nodes that they follow, by the rows of `pliant_mechanics::tie`. Masses were moved there when the
+//! model was made.
 
 use pliant_mechanics::model::Model;
 use pliant_mechanics::tensor::Vector;
@@ -11,9 +11,9 @@ use crate::{Device, GpuError};
 
 /// The nodes that follow others.
 pub(crate) struct Followers {
-    /// Which follower each node is, or [`NONE`].
+    /// Number of each node among the followers, or [`NONE`].
     number: Vec<u32>,
-    /// How many there are.
+    /// Number of followers.
     pub count: usize,
     /// Bits of the weights of all rows along each component, with the followed nodes.
     rows: Vec<[u32; 4]>,
@@ -53,7 +53,7 @@ impl Followers {
         Ok(Some(Self { number, count: followers.len(), rows, arrays }))
     }
 
-    /// Which follower a node is.
+    /// Returns the number of a node among the followers.
     pub(crate) fn number(&self, node: u32) -> Option<u32> {
         Some(self.number[node as usize]).filter(|&number| number != NONE)
     }
@@ -63,8 +63,8 @@ impl Followers {
         self.rows.iter().map(|&[.., followed]| followed)
     }
 
-    /// What gives forces on where each cell has slots, with the slots of followers as [`Followers::number`]
-    /// counts them, and the first of those that the followed nodes take.
+    /// Gives forces to followed nodes where each cell has slots. The slots of followers are counted as in
+    /// [`Followers::number`], and `first` is the first slot that the followed nodes take.
     pub(crate) fn among_slots(
         &self,
         device: &Device,
@@ -89,7 +89,7 @@ impl Followers {
         Giving { bound, snippet }
     }
 
-    /// What gives forces on where cells have added them up.
+    /// Gives forces to followed nodes where cells have added up their forces.
     pub(crate) fn among_sums(&self, device: &Device, forces: &wgpu::Buffer) -> Giving {
         let bound = Bound::new(device, &[&[Binding::Write(forces)], &self.bindings()[..]].concat());
         Giving { bound, snippet: include_str!("shaders/give_sums.wgsl").to_owned() }
@@ -100,15 +100,15 @@ impl Followers {
     }
 }
 
-/// How forces on followers go to the nodes that they follow, in a design.
+/// Path of forces on followers to the nodes that they follow, in a design.
 pub(crate) struct Giving {
     bound: Bound,
     snippet: String,
 }
 
-/// What ties do at an instant.
+/// Kernels of ties at an instant.
 pub(crate) struct DeviceTies {
-    /// Gives the forces on followers on, once those of cells are found.
+    /// Gives the forces on followers to the followed nodes, once the forces of cells are found.
     pub give: Kernel,
     /// Takes followers along, once nodes have moved.
     pub follow: Kernel,

@@ -14,7 +14,7 @@ pub struct Border {
 }
 
 impl Border {
-    /// No voxel at the sides of a grid.
+    /// Makes a border without voxels, for the sides of a grid.
     pub(crate) fn new(grid: &Grid) -> Self {
         const WORDS: [[&str; 2]; 3] = [["left", "right"], ["back", "front"], ["foot", "head"]];
         let along = |world: usize, axis: usize| grid.axes[(world, axis)] / grid.axes.column(axis).norm();
@@ -35,14 +35,14 @@ impl Border {
         sides.zip(voxels.as_flattened()).for_each(|((_, sum), voxels)| *sum += voxels);
     }
 
-    /// Whether the region has voxels at the border of the image.
+    /// True if the region has voxels at the border of the image.
     pub(crate) fn is_touched(&self) -> bool {
         self.sides.as_flattened().iter().any(|(_, voxels)| *voxels > 0)
     }
 }
 
 impl Serialize for Border {
-    /// Voxels by side, as far as there are any.
+    /// Serializes the numbers of voxels of the sides that have any.
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let touched = self.sides.as_flattened().iter().filter(|(_, voxels)| *voxels > 0);
         serializer.collect_map(touched.map(|(side, voxels)| (side, voxels)))

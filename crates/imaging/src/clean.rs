@@ -1,5 +1,5 @@
 //! The region of one label or several, cut out of its image, and its cleaning: keep the largest piece, fill
-//! holes, close gaps. Closing is dilation and erosion by a ball in millimetres, through exact distances, so
+//! holes, close gaps. Closing is dilation and erosion by a ball in millimetres, through exact distances. So
 //! it is the same along every axis of an image with thick slices.
 
 use std::fmt;
@@ -17,9 +17,9 @@ use crate::region::{LARGEST, Region};
 pub struct Cleaning {
     /// Width of gaps and channels to close [m]; 0 closes none.
     pub close_gaps: f64,
-    /// Whether to fill cavities that are not joined to the outside through faces of voxels.
+    /// True to fill cavities that are not joined to the outside through faces of voxels.
     pub fill_holes: bool,
-    /// Whether to keep only the largest piece.
+    /// True to keep only the largest piece.
     pub keep_largest: bool,
 }
 
@@ -94,7 +94,7 @@ impl Region {
         Ok((self, done))
     }
 
-    /// All that a ball of `radius` [m] outside the region cannot reach.
+    /// Closes gaps: adds everything that a ball of `radius` [m] outside the region cannot reach.
     fn closed(self, radius: f64) -> Result<Self, LabelError> {
         let spacing = self.grid.spacing();
         let wide = self.padded(spacing.map(|h| (radius / h).ceil() as usize + 1))?;

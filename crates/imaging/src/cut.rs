@@ -11,7 +11,7 @@ use crate::error::LabelError;
 use crate::image::{Image, LabelImage};
 use crate::names::LabelChoice;
 
-/// Voxels of a box from which on it is resampled, 322³. Fields of it take some 20 bytes a voxel.
+/// Most voxels of a box without resampling, 322³. Its fields take some 20 bytes a voxel.
 const MOST_VOXELS: usize = 1 << 25;
 
 /// The part of an image that is the body.
@@ -19,7 +19,7 @@ const MOST_VOXELS: usize = 1 << 25;
 pub enum Choice {
     /// These labels.
     Labels(Vec<i32>),
-    /// All voxels of at least this value, with label 1.
+    /// Voxels of at least this value, with label 1.
     From(f64),
 }
 
@@ -45,8 +45,9 @@ impl Cut {
 }
 
 impl Image {
-    /// The labels selected by words; an error if the image has no labels, lacks some of them, or has one in a
-    /// group and elsewhere. The labels of a group become one in the image. A note tells of rounded labels.
+    /// Returns the labels selected by words. It is an error if the image has no labels, lacks a selected one,
+    /// or has one in a group and elsewhere. The labels of a group become one in the image. Rounded labels are
+    /// noted.
     pub fn choose(&mut self, choices: &[LabelChoice]) -> Result<Choice, LabelError> {
         let present = self.survey()?;
         let (mut chosen, mut groups) = (Vec::new(), Vec::new());
@@ -79,7 +80,8 @@ impl Image {
         Ok(Choice::Labels(chosen))
     }
 
-    /// Gives the voxels of each group of labels the number of its first one, and that its name.
+    /// Gives the voxels of each group of labels the number of its first label, and this label the name of the
+    /// group.
     fn merge(&mut self, groups: Vec<(&String, Vec<i32>)>) {
         let mut first_of = BTreeMap::new();
         for (name, labels) in groups {
@@ -105,7 +107,7 @@ impl Image {
         }
     }
 
-    /// The labels of a choice that reach the border of the image, each with where.
+    /// The labels of a choice that reach the border of the image, each with its voxels there.
     pub fn border(&self, choice: &Choice) -> Vec<(i32, Border)> {
         let labels: &[i32] = match choice {
             Choice::Labels(labels) => labels,
@@ -134,7 +136,7 @@ impl Image {
         borders
     }
 
-    /// The label of a voxel if it belongs to a choice, and else 0.
+    /// The label of a voxel if it belongs to a choice, otherwise 0.
     fn chosen(&self, choice: &Choice, at: usize) -> i32 {
         match choice {
             Choice::Labels(labels) => {
@@ -190,8 +192,8 @@ impl Image {
         (0..nz).into_par_iter().filter_map(in_slice).reduce_with(wider)
     }
 
-    /// The labels of a choice in a box, in voxels of so many of the image each: the label that most of them
-    /// have.
+    /// Labels of a choice in a box, in coarser voxels of `factors` voxels of the image along each axis. Each
+    /// takes the label that most of its voxels have.
     fn resampled(
         &self,
         choice: &Choice,
@@ -232,7 +234,7 @@ impl Image {
     }
 }
 
-/// How many voxels along each axis become one: 1 unless the box is too large, first along the finest axes.
+/// Voxels along each axis that become one: 1 unless the box is too large, first along the finest axes.
 fn factors(dims: [usize; 3], spacing: [f64; 3], coarsest: f64) -> [usize; 3] {
     let mut factors = [1; 3];
     let size = |factors: [usize; 3]| (0..3).map(|axis| dims[axis].div_ceil(factors[axis])).product::<usize>();

@@ -1,7 +1,7 @@
-//! A smooth field of a region: the signed distance to its surface, clipped, smoothed by a Gaussian, shifted
-//! so that its zero surface encloses the volume of the voxels, and linear in each cell of eight voxel
-//! centres. Nearest voxels are exact (Felzenszwalb, Huttenlocher 2012, row by row along each axis). The
-//! surface is half a voxel before the nearest voxel of the other side, measured along the way to it.
+//! A smooth field of a region: the signed distance to its surface, clipped and smoothed by a Gaussian. It is
+//! shifted so that its zero surface encloses the volume of the voxels. It is linear in each cell of eight
+//! voxel centres. Nearest voxels are exact (Felzenszwalb, Huttenlocher 2012, row by row along each axis). The
+//! surface is half a voxel before the nearest voxel of the other side, measured along the way to that voxel.
 //! Distances use only the step lengths: in a sheared grid they are distances before shearing.
 
 use pliant_geometry::{DistanceField, Grid, Vector3};
@@ -13,7 +13,7 @@ use crate::region::Region;
 /// No voxel.
 const NONE: u32 = u32::MAX;
 
-/// How a field is smoothed, in voxels.
+/// Smoothing of a field, in voxels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Smoothing {
     /// Standard deviation of the Gaussian along each axis [voxels]; 0 does not smooth.
@@ -48,8 +48,8 @@ impl Region {
         self.distance_field_beside(&outside, smoothing, progress)
     }
 
-    /// The same to the surface between the region and another one in the same box; where neither is, by which
-    /// of them is nearer.
+    /// The smooth signed distance to the surface between the region and another one in the same box. In
+    /// voxels of neither, the nearer region decides.
     pub(crate) fn distance_field_beside(
         &self,
         other: &[bool],
@@ -83,8 +83,9 @@ fn largest(spacing: [f64; 3]) -> f64 {
     spacing.into_iter().fold(0.0, f64::max)
 }
 
-/// The distance to the surface between a region and another one [m], positive inside, cut at ± `clip`; in
-/// voxels of neither, half of how much nearer the region is.
+/// The distance to the surface between a region and another one [m], positive inside, cut at ± `clip`. In
+/// voxels of neither, it is half of the difference between the two distances, positive where the region is
+/// nearer.
 fn signed_distances(region: &Region, other: &[bool], clip: f64, progress: &dyn Fn(f64)) -> Vec<f32> {
     let grid = region.grid;
     let spacing = Vector3::from(grid.spacing());
@@ -207,7 +208,7 @@ impl Envelope {
     }
 }
 
-/// Convolution with a Gaussian along an axis; beyond the box the outermost values go on.
+/// Convolution with a Gaussian along an axis; beyond the box the outermost values continue.
 fn smoothed(grid: &Grid, values: Vec<f32>, axis: usize, sigma: f64) -> Vec<f32> {
     if sigma == 0.0 {
         return values;
@@ -234,8 +235,8 @@ fn smoothed(grid: &Grid, values: Vec<f32>, axis: usize, sigma: f64) -> Vec<f32> 
     out
 }
 
-/// The constant c for which f − c encloses `volume` [m³]. A voxel counts by the part of it, one mean step
-/// thick, on the inner side of a plane at the distance f − c.
+/// The constant c for which f − c encloses `volume` [m³]. A voxel counts by its part on the inner side of a
+/// plane at the distance f − c. The voxel is taken as one mean step thick.
 fn matching_shift(values: impl Iterator<Item = f32> + Clone, volume: f64, grid: &Grid) -> f64 {
     let step = grid.voxel_volume().cbrt();
     let near: Vec<f64> = values.clone().map(f64::from).filter(|f| f.abs() < 2.0 * step).collect();
@@ -244,7 +245,7 @@ fn matching_shift(values: impl Iterator<Item = f32> + Clone, volume: f64, grid: 
         let parts = near.iter().map(|f| (0.5 + (f - shift) / step).clamp(0.0, 1.0));
         (deep + parts.sum::<f64>()) * grid.voxel_volume()
     };
-    // Within a voxel either way: what needs more is a region that smoothing tore apart.
+    // The shift is within a voxel either way. Only a region that smoothing tore apart needs more.
     let (mut low, mut high) = (-step, step);
     for _ in 0..50 {
         let middle = (low + high) / 2.0;

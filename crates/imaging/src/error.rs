@@ -31,7 +31,7 @@ pub enum ImageError {
     Content {
         /// The file, or the folder of a series.
         path: PathBuf,
-        /// Where in the file.
+        /// Place in the file.
         place: Place,
         /// The problem.
         problem: Box<ImageProblem>,
@@ -65,7 +65,7 @@ pub enum ImageProblem {
         /// Error of the decoder.
         message: String,
     },
-    /// The first bytes are not those of the format.
+    /// The first bytes do not belong to the format.
     #[error("the file is not {format}: {found}; check the extension, or that the file is complete")]
     NotThisFormat {
         /// The format expected.
@@ -153,7 +153,7 @@ pub enum ImageProblem {
     SliceDiffers {
         /// File name of the slice.
         file: String,
-        /// What differs.
+        /// The property that differs.
         what: &'static str,
         /// The value of this slice.
         found: String,
@@ -215,7 +215,7 @@ pub enum LabelError {
     Grey {
         /// Different values.
         values: usize,
-        /// Whether there are more than were counted.
+        /// True if there are more than were counted.
         more: bool,
         /// The least and the largest value.
         range: [i32; 2],
@@ -296,13 +296,13 @@ pub enum LabelError {
     Emptied {
         /// The label.
         label: i32,
-        /// What removed the last voxel.
+        /// The operation that removed the last voxel.
         operation: &'static str,
     },
-    /// A length that must be positive and finite.
+    /// A length that is negative, too large or not finite.
     #[error("{what} is {value}; it must be finite and not negative")]
     BadLength {
-        /// Which length.
+        /// Name of the length.
         what: &'static str,
         /// Its value [m].
         value: f64,
@@ -317,7 +317,7 @@ pub enum LabelError {
         /// Voxels of the second.
         second: [usize; 3],
     },
-    /// More labels than a mesh can tell apart.
+    /// More labels than a mesh can distinguish.
     #[error("{labels} labels in one mesh, more than {limit}; mesh them in parts")]
     TooManyLabels {
         /// Requested labels.
@@ -335,7 +335,7 @@ pub enum LabelError {
     },
 }
 
-/// What helps where an operation left nothing of a label.
+/// Advice if an operation left nothing of a label.
 fn advice(operation: &str) -> &'static str {
     match operation {
         "cleaning" => {

@@ -1,4 +1,4 @@
-//! An image in memory: the numbers as the file holds them, and label images made of them.
+//! An image in memory: the numbers as the file holds them, and label images made from the numbers.
 
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
@@ -114,11 +114,11 @@ impl Numbers {
     }
 }
 
-/// Labels scaled by a single-precision slope miss whole numbers by this at most, in the usual numbers of
-/// labels.
+/// Largest distance of labels from whole numbers after scaling by a single-precision slope, for usual label
+/// numbers.
 const ROUND_OFF: f64 = 1e-4;
 
-/// Labels that a program interpolated between equal ones miss whole numbers by this at most.
+/// Largest distance of labels from whole numbers after interpolation between equal labels.
 const INTERPOLATED: f64 = 0.05;
 
 /// Different values that are counted; a scan may have more.
@@ -128,7 +128,7 @@ const MOST_VALUES: usize = 1 << 16;
 #[derive(Default)]
 struct Counts {
     values: BTreeMap<i32, [u64; 2]>,
-    /// Whether there are more values than are counted.
+    /// True if there are more values than are counted.
     more: bool,
 }
 
@@ -171,7 +171,7 @@ impl Counts {
 /// A volume read from a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
-    /// Where its voxels are.
+    /// Grid of its voxels.
     pub grid: Grid,
     /// The format found, e.g. `NIfTI-1`.
     pub format: String,
@@ -282,9 +282,9 @@ impl Image {
         }
     }
 
-    /// How far a label may be from a whole number. Scaled integers are within half a step of the label that
-    /// was stored, and have lost labels from a step of 1 on. Interpolation of equal labels misses them by its
-    /// weights, which do not add up to exactly 1.
+    /// Largest distance of a label from a whole number. Scaled integers are within half a step of the stored
+    /// label, and have lost labels from a step of 1 on. Interpolation of equal labels misses them slightly,
+    /// since its weights do not add up to exactly 1.
     fn label_tolerance(&self) -> f64 {
         let step = self.scale[0].abs();
         let scaled = if self.numbers.scalar.is_integer() && step < 1.0 { 0.5 * step } else { 0.0 };
@@ -364,7 +364,7 @@ impl Image {
         Ok(())
     }
 
-    /// All data of the image, piece by piece, for a hash of its content.
+    /// Passes the data of the image to `hear`, piece by piece, for a hash of its content.
     pub fn content(&self, mut hear: impl FnMut(&[u8])) {
         let Numbers { scalar, order, bytes } = &self.numbers;
         hear(format!("{:?} {scalar:?} {order:?} {:?}", self.grid, self.scale).as_bytes());
@@ -394,7 +394,7 @@ impl Image {
 /// An image of labels: one region a number, 0 the background.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LabelImage {
-    /// Where its voxels are.
+    /// Grid of its voxels.
     pub grid: Grid,
     /// One label a voxel, i fastest; as long as the grid.
     pub labels: Vec<i32>,

@@ -1,5 +1,5 @@
-//! What regions an image of labels holds: size, place, and pieces joined through faces of voxels. Runs of
-//! equal labels along i are joined with the runs of neighbouring rows (He, Chao, Suzuki 2008).
+//! Regions in an image of labels: size, place, and pieces joined through faces of voxels. Runs of equal
+//! labels along i are joined with the runs of neighbouring rows (He, Chao, Suzuki 2008).
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -128,7 +128,7 @@ pub(crate) struct Components {
 }
 
 impl Components {
-    /// Of all voxels whose label is not `background`.
+    /// Joins all voxels whose label is not `background`.
     pub(crate) fn new(dims: [usize; 3], label: impl Fn(usize) -> i32, background: i32) -> Self {
         let [nx, ny, nz] = dims;
         let mut runs: Vec<Run> = Vec::new();
@@ -195,8 +195,8 @@ impl Components {
         sizes
     }
 
-    /// Components that are at least in one row: the first run of the largest one (of equals the first), and
-    /// how many.
+    /// Returns the first run of the largest component (the first among equals) and the number of components;
+    /// `None` without components.
     pub(crate) fn largest(&self) -> Option<(u32, usize)> {
         let sizes = self.sizes();
         let count = sizes.iter().filter(|&&size| size > 0).count();

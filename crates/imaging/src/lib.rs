@@ -1,6 +1,6 @@
-//! Medical images: volumes read from files, regions of a label, their cleaning, and smooth fields of them.
+//! Medical images: volumes read from files, regions of a label, their cleaning, and their smooth fields.
 //! World coordinates are metres, in RAS: x to the patient's right, y to the front, z to the head. Voxel
-//! centres lie at whole numbers of the grid. Leaves out: registration, resampling (but to coarser voxels),
+//! centres lie at whole numbers of the grid. Leaves out: registration, resampling (except to coarser voxels),
 //! segmentation.
 //!
 //! ```no_run

@@ -1,6 +1,6 @@
-//! Names of labels: from the image itself, from tables beside it (ITK-SNAP's label descriptions, colour
-//! tables of FreeSurfer and 3D Slicer, JSON), or as TotalSegmentator publishes them; and the words by which
-//! labels are chosen.
+//! Names of labels, and the words by which labels are chosen. Names come from the image itself, from tables,
+//! or as TotalSegmentator publishes them. Tables are ITK-SNAP's label descriptions, colour tables of
+//! FreeSurfer and 3D Slicer, and JSON.
 
 use std::collections::BTreeMap;
 use std::convert::Infallible;
@@ -36,9 +36,9 @@ impl LabelNames {
         names
     }
 
-    /// Reads a table of names, or loads the one named `totalsegmentator`: label descriptions of ITK-SNAP,
-    /// colour tables of FreeSurfer or 3D Slicer, lines like `5 liver`, or JSON like `{"5": "liver"}` or
-    /// `{"labels": {"liver": 5}}`.
+    /// Reads a table of names, or loads the one named `totalsegmentator`. A table holds label descriptions of
+    /// ITK-SNAP, or a colour table of FreeSurfer or 3D Slicer. Lines like `5 liver`, or JSON like
+    /// `{"5": "liver"}` or `{"labels": {"liver": 5}}` are read, too.
     pub fn read(table: &Path) -> Result<Self, ImageError> {
         if table == Path::new("totalsegmentator") {
             return Ok(Self::total_segmentator());
@@ -48,7 +48,7 @@ impl LabelNames {
         Self::of_table(&String::from_utf8_lossy(&bytes)).map_err(|fault| fault.in_file(table))
     }
 
-    /// The same, of the text of a table.
+    /// Reads names from the text of a table.
     pub(crate) fn of_table(text: &str) -> Result<Self, Fault> {
         let text = text.trim_start_matches('\u{feff}');
         let names = if text.trim_start().starts_with('{') { of_json(text)? } else { of_lines(text)? };
@@ -123,17 +123,16 @@ impl LabelNames {
     }
 }
 
-/// A label, a range of labels, a name or a group of them, as people type it: `5`, `5-8`, `liver`,
-/// `tissue=1,5,7-9`.
+/// A label, a range of labels, a name or a group, as people type it: `5`, `5-8`, `liver`, `tissue=1,5,7-9`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum LabelChoice {
     /// A label by its number.
     One(i32),
-    /// All labels from one to another that the image has.
+    /// Labels of the image from one number to another.
     Range(i32, i32),
     /// The label of this name.
     Named(String),
-    /// Several labels as one of this name; its number is that of the first.
+    /// Several labels as one of this name; its number is the number of the first.
     Group(String, Vec<LabelChoice>),
 }
 

@@ -1,5 +1,5 @@
-//! The parts of a region that have different labels, each with its distances in its own box: all together
-//! take about as much memory as the region, however many they are.
+//! The parts of a region that have different labels, each with its distances in its own box. The number of
+//! parts does not matter: all together take about as much memory as the region.
 
 use std::collections::BTreeMap;
 
@@ -91,7 +91,7 @@ impl Parts {
     /// `progress` hears fractions from 0 to 1.
     ///
     /// # Errors
-    /// If smoothing leaves nothing of it.
+    /// If smoothing leaves nothing of the part.
     pub fn distance_field(
         &self,
         part: usize,

@@ -5,7 +5,7 @@ use pliant_geometry::Grid;
 use crate::error::LabelError;
 use crate::image::LabelImage;
 
-/// Voxels of a region with its margin: what 32-bit numbers of voxels bear, with room.
+/// Most voxels of a region with its margin, so that their numbers fit into 32 bits.
 pub(crate) const LARGEST: u64 = 1 << 30;
 
 /// A region of an image: a box of voxels, each inside or not. The box has a margin; it may reach beyond the
@@ -14,9 +14,9 @@ pub(crate) const LARGEST: u64 = 1 << 30;
 pub struct Region {
     /// The first label of the region, for messages.
     pub label: i32,
-    /// Where the voxels of the box are.
+    /// Grid of the voxels of the box.
     pub grid: Grid,
-    /// Whether each voxel is inside, i fastest.
+    /// True for each voxel inside, i fastest.
     pub inside: Vec<bool>,
 }
 

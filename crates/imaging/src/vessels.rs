@@ -1,19 +1,20 @@
-//! The parts of vessels that run inside an organ. A segmentation labels them apart from the tissue round
-//! them, and labels of large vessels go on far outside. A voxel of a vessel is inside if from it most of the
-//! 26 ways to its neighbours and on lead through vessels into the organ: in a tube inside all but those along
-//! it do, in one that lies against the organ less than half.
+//! The parts of vessels that run inside an organ. A segmentation labels vessels apart from the tissue round
+//! them, and labels of large vessels continue far outside. From a voxel of a vessel 26 straight ways lead
+//! through its neighbours. The voxel is inside if most of these ways lead through vessels into the organ. In
+//! a tube inside the organ all ways do but the ones along the tube. In a tube that lies against the organ
+//! less than half do.
 
 use rayon::prelude::*;
 
 use crate::image::{Image, Numbers, Order, Scalar};
 
-/// Ways into the organ of a voxel that is inside, of 26.
+/// Least number of ways into the organ, of 26, of a voxel inside.
 const INSIDE: usize = 14;
 
 impl Image {
-    /// The image of labels with the voxels of vessels inside an organ as voxels of the organ, each with the
-    /// label that most ways lead to; and how many voxels of the vessels are inside and outside. Labels of the
-    /// organ are no vessels.
+    /// Returns the image of labels with the voxels of vessels inside an organ as voxels of the organ. Each
+    /// takes the label that most ways lead to. Also returns the numbers of voxels of the vessels inside and
+    /// outside. Labels of the organ are no vessels.
     pub fn with_vessels_inside(&self, organ: &[i32], vessels: &[i32]) -> (Self, [usize; 2]) {
         let vessels: Vec<i32> = vessels.iter().copied().filter(|label| !organ.contains(label)).collect();
         let dims = self.grid.dims;
@@ -46,7 +47,7 @@ impl Image {
                 return (own, Some(false));
             }
             let count = |label: i32| found.iter().filter(|&&own| own == label).count();
-            // Of equals the first of the organ's.
+            // Among equals, the first label of the organ wins.
             let most = organ.iter().rev().max_by_key(|&&label| count(label));
             (most.copied().unwrap_or(own), Some(true))
         };
@@ -67,8 +68,8 @@ mod tests {
     use super::*;
     use crate::names::LabelNames;
 
-    /// A ball of label 5 with a tube of label 8 through it that goes on outside, and one of label 9 that lies
-    /// against it.
+    /// A ball of label 5 with a tube of label 8 through it that continues outside. Another tube, of label 9,
+    /// lies against the ball.
     #[test]
     fn a_tube_is_inside_where_the_ball_is_round_it() {
         let grid = Grid::along_axes([41, 41, 61], Vector3::zeros(), [1e-3, 1e-3, 1e-3]).unwrap();
@@ -94,7 +95,7 @@ mod tests {
             let is_inside = x.hypot(y) < 3.5 && x.hypot(y).hypot(z) < 16.0;
             exact += usize::from(is_inside);
             assert!(label(at) != 9 || filled.label(at) == 9, "the tube that lies against the ball");
-            // Near its ends the tube is as much in the ball as out of it.
+            // Near its ends the tube is half in the ball and half out.
             wrong += usize::from(
                 label(at) == 8 && (filled.label(at) == 5) != is_inside && (z.abs() - 15.6).abs() > 4.0,
             );

@@ -1,5 +1,4 @@
-//! Counts in the bytes of states. One that is so large that counting on would overflow is none that a run has
-//! reached.
+//! Counts in the bytes of states. No run reaches a count that would overflow soon; such a count is refused.
 //!
 //! ```
 //! #[derive(Debug, serde::Deserialize)]
@@ -17,7 +16,7 @@ use serde::de::{Deserialize, Deserializer, Error};
 
 /// A number that counts.
 pub trait Count: Copy {
-    /// Whether a run can go on counting from here: the first bits are 0.
+    /// True if a run can continue counting from here: the highest bits are 0.
     fn can_go_on(self) -> bool;
 }
 
@@ -42,13 +41,14 @@ impl Count for usize {
 /// Reads a count.
 ///
 /// # Errors
-/// If it is none, or too large to count on from.
+/// If the value is no count, or too large to continue counting from.
 pub fn read<'de, D: Deserializer<'de>, C: Count + Deserialize<'de>>(from: D) -> Result<C, D::Error> {
     let count = C::deserialize(from)?;
     if count.can_go_on() { Ok(count) } else { Err(D::Error::custom("a count that no run reaches")) }
 }
 
-/// Whether a time [s] can be that of a run: one after its start, to which steps of a length [s] can be added.
+/// True if a time [s] can occur in a run: it is not before the start, and steps of a length [s] still change
+/// it.
 pub fn is_time(time: f64, step: f64) -> bool {
     time >= 0.0 && time + 1e-3 * step > time
 }

@@ -1,4 +1,4 @@
-//! How a motion or a load grows over time: a factor from 0 to 1 between two times, or a table.
+//! Growth of a motion or a load over time: a factor from 0 to 1 between two times, or a table.
 
 use std::f64::consts::TAU;
 
@@ -72,8 +72,8 @@ impl Curve {
         }
     }
 
-    /// The same curve from 0 on: what it has at time 0 comes in linearly up to a time [s], as a static solver
-    /// needs that halves its first load step. A curve that begins at 0 stays as it is.
+    /// Returns a curve that starts from 0: a value at time 0 is reached linearly at a time [s]. A static
+    /// solver that halves its first load step needs this. A curve that begins at 0 stays unchanged.
     #[must_use]
     pub fn from_rest(self, until: f64) -> Self {
         match self.shape {
@@ -142,7 +142,7 @@ mod tests {
         }
     }
 
-    /// What is there from the start comes in within a first step; later all is as it was, and curves from 0
+    /// A value at the start is reached within a first step; later values are unchanged, and curves from 0
     /// keep their shape.
     #[test]
     fn curves_from_rest_begin_at_zero_and_are_the_same_later() {

@@ -18,8 +18,9 @@ pub struct Energies {
     /// Energy that explicit steps of changing length added: Σ ⅛ (Δt⁻² − Δt⁺²) Σ m|a|² over the changes from
     /// Δt⁻ to Δt⁺.
     pub step_changes: f64,
-    /// |kinetic + internal + damping + hourglass − external − step changes| over the largest of them so far, with ⅛ Δt² Σ m|a|² of
-    /// the start as part of the kinetic energy: of loads that set in at once it stays behind for good.
+    /// Balance |kinetic + internal + damping + hourglass − external − step changes| over the largest of these
+    /// energies so far. The kinetic energy includes ⅛ Δt² Σ m|a|² of the start: with loads that set in at
+    /// once this part remains for good.
     pub balance: f64,
 }
 

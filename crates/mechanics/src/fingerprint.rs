@@ -1,4 +1,4 @@
-//! Numbers that tell one model from another, part by part and bit for bit, by FNV-1a in 64 bits: the same on
+//! Numbers that distinguish models, part by part and bit for bit, by FNV-1a in 64 bits. They are the same on
 //! every machine and in every version of the language.
 
 use std::fmt::{self, Debug, Write};

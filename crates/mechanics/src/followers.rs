@@ -50,9 +50,9 @@ impl Model {
         Ok(self.ties.len() - 1)
     }
 
-    /// Lets tied nodes follow no longer along components that a constraint holds or moves, of them and of a
-    /// node of the other body that they follow: both bodies are held there, as at a plane of symmetry. To be
-    /// called once constraints and ties are there.
+    /// Stops tied nodes from following along components that a constraint holds or moves in both bodies. The
+    /// constraint must act on the tied node and on a node of the other body that it follows, as at a plane of
+    /// symmetry. To be called once constraints and ties are there.
     pub fn prescribe_tied(&mut self) {
         let mut held = vec![[false; 3]; self.node_count()];
         for constraint in self.constraints.iter().filter(|own| !own.motion.is_collective()) {
@@ -74,7 +74,7 @@ impl Model {
         }
     }
 
-    /// Whether each node follows others.
+    /// Returns for each node true if it follows others.
     pub fn followers(&self) -> Vec<bool> {
         let mut follows = vec![false; self.node_count()];
         self.ties.iter().flat_map(|tie| &tie.nodes).for_each(|&node| follows[node as usize] = true);
@@ -93,7 +93,7 @@ impl Model {
         }
     }
 
-    /// Jᵀ of forces on all nodes: those on nodes that follow others go to these.
+    /// Jᵀ of forces on all nodes: a force on a node that follows others goes to the followed nodes.
     pub fn give_back(&self, forces: &mut [Vector<f64>]) {
         for (node, row) in self.ties.iter().flat_map(Tie::component_rows) {
             let force = std::mem::take(&mut forces[node as usize]);
@@ -104,9 +104,9 @@ impl Model {
         }
     }
 
-    /// Row sums of Jᵀ M J: the masses of nodes that follow others go to these. Where rows have so many
-    /// negative weights that a followed node would lose mass by a tie, as beside a much heavier element, all
-    /// masses of that tie go by the rows without their negative weights.
+    /// Row sums of Jᵀ M J: the mass of a node that follows others goes to the followed nodes. Negative
+    /// weights could take mass from a followed node, as next to a much heavier element. All masses of that
+    /// tie then go by the rows without negative weights.
     pub(crate) fn give_down(&self, masses: &mut [f64]) {
         for tie in &self.ties {
             let given: Vec<f64> =
@@ -127,8 +127,8 @@ impl Model {
         }
     }
 
-    /// A bound of Jᵀ K J by nodes: |J_ai| Σ_j |J_aj| k_a of the stiffness k_a of each node that follows
-    /// others goes to the nodes i.
+    /// A bound of Jᵀ K J by nodes. The stiffness k_a of each node that follows others goes to the nodes i
+    /// as |J_ai| Σ_j |J_aj| k_a.
     pub fn give_down_stiffness(&self, stiffness: &mut [f64]) {
         for (node, row) in self.ties.iter().flat_map(Tie::rows) {
             let own = std::mem::take(&mut stiffness[node as usize]);

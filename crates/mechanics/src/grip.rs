@@ -1,6 +1,6 @@
-//! Grips: springs between points of bodies and places in space, that come and go while a run goes on, as a
-//! hand takes hold of tissue and lets it go. With the point x = Σ wᵢ (Xᵢ + uᵢ) and the place p, node i feels
-//! wᵢ k (p − x).
+//! Grips: springs between points of bodies and places in space. They come and go during a run, as a hand
+//! takes hold of tissue and lets it go. With the point x = Σ wᵢ (Xᵢ + uᵢ) and the place p, node i feels wᵢ k
+//! (p − x).
 
 use serde::{Deserialize, Serialize};
 
@@ -33,9 +33,9 @@ impl Grip {
         scale(sub(self.place, self.position(state, 0)), self.stiffness)
     }
 
-    /// The stiffness [N/m] up to which such a spring leaves explicit steps [s] of 0.9 of the critical time
-    /// step stable. It adds at most k Σ wᵢ²/mᵢ to the squares of the angular frequencies (Weyl), whose limit
-    /// is 4/Δt² and of which 0.81 are taken.
+    /// Returns the stiffness [N/m] up to which such a spring leaves explicit steps [s] of 0.9 of the critical
+    /// time step stable. It adds at most k Σ wᵢ²/mᵢ to the squares of the angular frequencies (Weyl). Their
+    /// limit is 4/Δt², of which 0.81 are taken.
     pub fn stiffest<S: Configuration>(&self, state: &S, model: &Model, step: f64) -> f64 {
         let inertia = |node: u32| [model.inertia(node as usize), 0.0];
         let mobility = self.mobility(state, 0, [1.0, 0.0, 0.0], &inertia);

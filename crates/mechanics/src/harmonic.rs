@@ -1,5 +1,5 @@
 //! Harmonic functions on a body at rest: ∇²φ = 0 with φ given on some nodes and no flux through the rest of
-//! the surface, by linear tetrahedra and trilinear hexahedra (eight Gauss points), Σ_e ∫ B_a · B_b dV
+//! the surface. Linear tetrahedra and trilinear hexahedra (eight Gauss points) give Σ_e ∫ B_a · B_b dV
 //! φ_b = 0. Solved by conjugate gradients with the diagonal as preconditioner (Saad, Iterative Methods for
 //! Sparse Linear Systems, 2003, alg. 9.1).
 
@@ -60,7 +60,7 @@ pub struct NotSolved {
 }
 
 impl Laplacian {
-    /// Of the tetrahedra and hexahedra between some points [m].
+    /// Makes the Laplacian of the tetrahedra and hexahedra between some points [m].
     pub fn new(points: &[Vector<f64>], tets: &[[u32; 4]], hexes: &[[u32; 8]]) -> Self {
         let of_tet = |&nodes: &[u32; 4]| {
             let rest = tet4(&nodes.map(|node| points[node as usize]));

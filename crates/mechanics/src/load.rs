@@ -16,17 +16,17 @@ pub const NO_NODE: u32 = u32::MAX;
 pub struct Load {
     /// Its name in messages.
     pub name: String,
-    /// What acts.
+    /// Kind and size of the load.
     pub kind: LoadKind,
     /// Factor over time.
     pub curve: Curve,
     /// The carried surface that forces and pressures number their points in; `None`: the model's own nodes.
     pub surface: Option<usize>,
-    /// Whether a static solver finds its size, as a control asks.
+    /// True if a static solver finds the size of the load, as a control requires.
     pub controlled: bool,
 }
 
-/// What a load does.
+/// Kinds of loads.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LoadKind {
     /// A dead force [N] on each of some nodes (nodal forces and tractions become this).
@@ -39,7 +39,7 @@ pub enum LoadKind {
         facets: Vec<u32>,
         /// Pressure [Pa], positive along the normal.
         pressure: f64,
-        /// How it comes to the nodes.
+        /// Distribution of the pressure to the nodes.
         spread: Spread,
     },
     /// Pressure [Pa] on faces, pushing against the outward normal of the deformed face.
@@ -58,7 +58,7 @@ pub enum LoadKind {
     },
 }
 
-/// How a pressure on a shell comes to its nodes.
+/// Distribution of a pressure on a shell to its nodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Spread {
     /// A third of p A n of the flat facet to each corner: for flat membranes.
@@ -69,13 +69,13 @@ pub enum Spread {
 }
 
 impl LoadKind {
-    /// The same force [N] on each of some nodes.
+    /// Makes an equal force [N] on each of some nodes.
     pub fn force(nodes: impl IntoIterator<Item = u32>, force: impl Into<Vector<f64>>) -> Self {
         let force = force.into();
         Self::Forces(nodes.into_iter().map(|node| (node, force)).collect())
     }
 
-    /// The same moment [N m] on each of some nodes.
+    /// Makes an equal moment [N m] on each of some nodes.
     pub fn moment(nodes: impl IntoIterator<Item = u32>, moment: impl Into<Vector<f64>>) -> Self {
         let moment = moment.into();
         Self::Moments(nodes.into_iter().map(|node| (node, moment)).collect())
@@ -88,7 +88,7 @@ impl Load {
         Self { name: name.into(), kind, curve, surface: None, controlled: false }
     }
 
-    /// Whether only shells take it.
+    /// True if the load acts on shells only.
     pub fn is_for_shells(&self) -> bool {
         matches!(self.kind, LoadKind::Moments(_) | LoadKind::ShellPressure { .. })
     }
@@ -100,9 +100,9 @@ impl Load {
         Self::new("gravity", kind, curve)
     }
 
-    /// Adds the nodal forces [N] at a time. `points` are those of the surface that it acts on. Gravity is not
-    /// added here, since it acts through the masses; nor are loads of shells, which `pliant-implicit`
-    /// applies.
+    /// Adds the nodal forces [N] at a time. `points` are the points of the load's surface. Gravity is not
+    /// added here, since it acts through the masses. Loads of shells are not added either; `pliant-implicit`
+    /// applies them.
     pub fn add_forces<S: Configuration>(
         &self,
         time: f64,
@@ -145,8 +145,8 @@ impl Load {
     }
 }
 
-/// The part of a face's area vector [m²] that belongs to each of its nodes: ∫ N_a n dA, exact for flat
-/// triangles and for bilinear quads (2×2 Gauss points).
+/// Returns the part of a face's area vector [m²] that belongs to each of its nodes: ∫ N_a n dA. Exact for
+/// flat triangles and for bilinear quads (2×2 Gauss points).
 pub fn face_areas(
     face: &Face,
     position: impl Fn(u32) -> Vector<f64>,

@@ -3,16 +3,16 @@
 use crate::Real;
 use crate::tensor::{Vector, add, cast, cross, dot, scale, sub};
 
-/// How points follow the nodes of a model at a state, one point at a time. `S` is what a solver knows of its
-/// nodes.
+/// Motion of points that follow the nodes of a model at a state, one point at a time. `S` is the state of the
+/// nodes in a solver.
 pub trait Mapping<S: ?Sized> {
-    /// Where a point is [m].
+    /// Place of a point [m].
     fn position(&self, state: &S, point: usize) -> Vector<f64>;
 
     /// The velocity of a point [m/s].
     fn velocity(&self, state: &S, point: usize) -> Vector<f64>;
 
-    /// Jᵀ of a force [N] on a point: calls `add` with each node, the force on it [N] and the moment [N m],
+    /// Jᵀ of a force [N] on a point. Calls `add` with each node, the force on it [N] and the moment [N m],
     /// which is 0 where nodes do not turn.
     fn add_force(
         &self,
@@ -22,8 +22,8 @@ pub trait Mapping<S: ?Sized> {
         add: &mut dyn FnMut(u32, Vector<f64>, Vector<f64>),
     );
 
-    /// How much a point is accelerated by a unit force along a direction, n·J M⁻¹ Jᵀ n [1/kg], where a node
-    /// has this mass [kg] and rotary inertia [kg m²].
+    /// Acceleration of a point per unit force along a direction, n·J M⁻¹ Jᵀ n [1/kg]. `inertia` gives the
+    /// mass [kg] and rotary inertia [kg m²] of a node.
     fn mobility(
         &self,
         state: &S,
@@ -43,13 +43,13 @@ pub trait Mapping<S: ?Sized> {
     }
 }
 
-/// What sums may be off by, over the sizes of their parts.
+/// Rounding error of sums, over the sizes of their parts.
 const ROUND_OFF: f64 = 1e-12;
 
-/// Checks a mapping at some points, for those who write one: forces go back by the transpose (⟨J v, f⟩ = ⟨v,
-/// Jᵀ f⟩) and keep their sum and their moment, to 1e-12 of what is summed up; velocities are the change of
-/// positions between two states a time apart [s], to 1e-6. `node` gives position, velocity and spin of a node
-/// in between, where the mapping is asked.
+/// Checks a mapping at some points, for authors of mappings. Forces must go back by the transpose (⟨J v, f⟩ =
+/// ⟨v, Jᵀ f⟩) and keep their sum and their moment. The tolerance is 1e-12 of the summed parts. Velocities
+/// must be the change of positions between two states a time apart [s], to 1e-6. `node` gives position,
+/// velocity and spin of a node at the middle state.
 ///
 /// # Errors
 /// The first check that fails, with its size.
@@ -91,9 +91,9 @@ pub fn check<S>(
     Ok(())
 }
 
-/// Where the nodes of a model are and how they move.
+/// Places and velocities of the nodes of a model.
 pub trait Configuration {
-    /// Where a node is [m].
+    /// Place of a node [m].
     fn position(&self, node: u32) -> Vector<f64>;
 
     /// The velocity of a node [m/s].
@@ -121,8 +121,8 @@ impl<R: Real> Configuration for Displaced<'_, R> {
     }
 }
 
-/// A sparse J of constant weights, x = J x_nodes: rows of (node, weight), one row per point, such as the
-/// barycentric weights of a point in a tetrahedron or the trilinear ones in a hexahedron.
+/// A sparse J of constant weights, x = J x_nodes: rows of (node, weight), one row per point. Examples are the
+/// barycentric weights of a point in a tetrahedron or the trilinear weights in a hexahedron.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Weights {
     /// First entry of each row, one more than there are rows.
@@ -134,7 +134,7 @@ pub struct Weights {
 }
 
 impl Weights {
-    /// From one row of (node, weight) per carried point.
+    /// Makes the weights from one row of (node, weight) per carried point.
     pub fn from_rows<'a>(rows: impl IntoIterator<Item = &'a [(u32, f64)]>) -> Self {
         let mut mapping = Self { offsets: vec![0], ..Self::default() };
         for row in rows {
@@ -153,9 +153,9 @@ impl Weights {
         range.map(|k| (self.nodes[k], self.weights[k]))
     }
 
-    /// [`row`](Self::row) with weights from 0 to 1: of a point outside of its cell those of one inside. A
-    /// field that no law extends, such as a stress, is carried by these: it keeps between the values at the
-    /// nodes.
+    /// Returns [`row`](Self::row) with weights from 0 to 1: a point outside of its cell gets the weights of a
+    /// point inside. A field that no law extends, such as a stress, uses these weights: it stays between the
+    /// values at the nodes.
     pub fn inner_row(&self, point: usize) -> impl Iterator<Item = (u32, f64)> + '_ {
         let sum: f64 = self.row(point).map(|(_, weight)| weight.max(0.0)).sum();
         self.row(point).map(move |(node, weight)| (node, weight.max(0.0) / sum))

@@ -1,8 +1,8 @@
-//! The order of the cells of a solid: blocks of neighbours, found by cutting the cells in two across their
-//! longest extent until each part is a block (recursive coordinate bisection). A block then has few nodes,
-//! most of them its own, whatever the order in the user's mesh. Within a block each lane of the packs walks
-//! through a corner of its own, so that cells side by side rarely share a node: of a row of tets around one
-//! edge each sum would wait for the one before.
+//! The order of the cells of a solid. Cells are cut in two across their longest extent until each part is a
+//! block of neighbours (recursive coordinate bisection). A block then has few nodes, most of them its own,
+//! whatever the order in the user's mesh. Within a block each lane of the packs walks through a separate
+//! corner, so that cells side by side rarely share a node. In a row of tets around one edge each sum would
+//! wait for the one before.
 
 use crate::tensor::Vector;
 
@@ -28,8 +28,8 @@ pub fn order(centres: &[Vector<f64>]) -> Vec<u32> {
     ordered
 }
 
-/// Cuts cells across their longest extent until each part has no more than `size`; all parts but the last
-/// have just so many.
+/// Cuts cells across their longest extent until each part has at most `size` cells. All parts but the last
+/// have exactly `size`.
 fn bisect(cells: &mut [u32], centres: &[Vector<f64>], size: usize) {
     let parts = cells.len().div_ceil(size);
     if parts < 2 {

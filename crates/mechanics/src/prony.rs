@@ -1,11 +1,11 @@
-//! Viscoelasticity by Prony series on the second Piola–Kirchhoff stress, the isochoric and the volumetric
-//! part each with a series of its own: S = (1 − Σ aᵢ) Φ + Σ hᵢ, with Φ the elastic stress of the law.
+//! Viscoelasticity by Prony series on the second Piola–Kirchhoff stress: S = (1 − Σ aᵢ) Φ + Σ hᵢ, with Φ the
+//! elastic stress of the law. The isochoric and the volumetric part have a series each.
 //!
-//! Both updates have the form hᵢⁿ = dᵢ hᵢⁿ⁻¹ + gᵢ (Φⁿ − Φⁿ⁻¹):
-//! *exact* for Φ linear in the step (Taylor, Pister and Goudreau 1970): d = e^(−Δt/τ), g = a (1 − d) τ/Δt;
-//! *backward Euler* (thesis 5.57–5.61, there written with a − h): d = τ/(Δt + τ), g = a d.
-//! A step of no time, d = 1 and g = a, is a jump: it loads the instantaneous law. So a history begins.
-//! Leaves out: a thermodynamic derivation; for anisotropic finite strain the dissipation may be non-monotone.
+//! Both updates have the form hᵢⁿ = dᵢ hᵢⁿ⁻¹ + gᵢ (Φⁿ − Φⁿ⁻¹). The *exact* update is for Φ linear in the step
+//! (Taylor, Pister and Goudreau 1970): d = e^(−Δt/τ), g = a (1 − d) τ/Δt. The update by *backward Euler*
+//! (thesis 5.57–5.61, there written with a − h) is: d = τ/(Δt + τ), g = a d. A step of no time, d = 1 and g =
+//! a, is a jump: it loads the instantaneous law. A history begins with such a step. Leaves out: a
+//! thermodynamic derivation. For anisotropic finite strain the dissipation may be non-monotone.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::law::Split;
 use crate::tensor::Symmetric;
 
-/// Which part of the stress relaxes.
+/// Part of the stress that relaxes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Part {
@@ -46,7 +46,7 @@ pub struct PronyTerm {
     pub time: f64,
 }
 
-/// How the history is advanced over a step.
+/// Method that advances the history over a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum PronyUpdate {
@@ -81,7 +81,7 @@ pub struct Prony {
     pub isochoric: Vec<(f64, f64)>,
     /// Terms (a, τ) on the volumetric part.
     pub volumetric: Vec<(f64, f64)>,
-    /// How the history advances.
+    /// Method that advances the history.
     pub update: PronyUpdate,
 }
 
@@ -100,7 +100,7 @@ pub enum PronyError {
         /// Its relaxation time [s].
         time: f64,
     },
-    /// Nothing of the stress would be left after relaxing.
+    /// No stress would be left after relaxing.
     #[error(
         "the {part:?} weights sum to {sum}; they must sum to less than 1, or nothing is left to hold the tissue"
     )]
@@ -174,12 +174,12 @@ impl Prony {
         if averages { self.isochoric_slots() } else { self.slots() }
     }
 
-    /// Those of the isochoric part.
+    /// Symmetric tensors of history of the isochoric part.
     pub fn isochoric_slots(&self) -> usize {
         if self.isochoric.is_empty() { 0 } else { 1 + self.isochoric.len() }
     }
 
-    /// Those of the volumetric part.
+    /// Symmetric tensors of history of the volumetric part.
     pub fn volumetric_slots(&self) -> usize {
         if self.volumetric.is_empty() { 0 } else { 1 + self.volumetric.len() }
     }

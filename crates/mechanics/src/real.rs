@@ -8,7 +8,7 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// What laws, tensors and elements compute with: a real number, or a lane's worth of them side by side.
+/// Number type of laws, tensors and elements: a real number, or a lane of them side by side.
 pub trait Number:
     Copy
     + Debug
@@ -64,11 +64,11 @@ pub trait Real: Number + Default + PartialOrd + Serialize + DeserializeOwned + S
     const EPSILON: f64;
     /// The word for it in reports: `single` or `double`.
     const PRECISION: &'static str;
-    /// As `f64`, exactly.
+    /// Converts to `f64`, exactly.
     fn to_f64(self) -> f64;
 }
 
-/// A step of Householder's method of third order: with r = 1 − x y³, y ← y (1 + r/3 + 2r²/9), which leaves
+/// Takes a step of Householder's method of third order: with r = 1 − x y³, y ← y (1 + r/3 + 2r²/9). It leaves
 /// 14/3 of the third power of the relative error.
 #[inline(always)]
 pub fn closer_to_inverse_cbrt<N: Number>(x: N, y: N) -> N {
@@ -153,7 +153,7 @@ mod tests {
 
     #[test]
     fn cube_roots_are_accurate_over_all_volume_ratios() {
-        // Three units in the last place: what is left is the rounding of the last iteration.
+        // Three units in the last place: the rounding of the last iteration.
         let check = |x: f64| {
             let (double, single) = (Number::cbrt(x) / x.cbrt() - 1.0, x as f32);
             assert!(double.abs() < 3.0 * f64::EPSILON, "{x}: {double:e}");

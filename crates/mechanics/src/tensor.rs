@@ -58,7 +58,7 @@ pub fn cast<A: Real, B: Number>(a: Vector<A>) -> Vector<B> {
 pub struct Tensor<R>(pub [[R; 3]; 3]);
 
 impl<R: Number> Tensor<R> {
-    /// All zeros.
+    /// The zero tensor.
     pub const ZERO: Self = Self([[R::ZERO; 3]; 3]);
 
     /// The identity.
@@ -151,7 +151,7 @@ impl<R: Number> Tensor<R> {
 pub struct Symmetric<R>(pub [R; 6]);
 
 impl<R: Number> Symmetric<R> {
-    /// All zeros.
+    /// The zero tensor.
     pub const ZERO: Self = Self([R::ZERO; 6]);
 
     /// The identity.
@@ -244,7 +244,7 @@ impl<R: Number> Symmetric<R> {
         dot([xx, yy, zz], [b.0[0], b.0[1], b.0[2]]) + shear + shear
     }
 
-    /// As a full tensor.
+    /// Returns the full tensor.
     #[inline(always)]
     pub fn full(&self) -> Tensor<R> {
         let [xx, yy, zz, xy, yz, xz] = self.0;

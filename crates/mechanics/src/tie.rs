@@ -1,7 +1,7 @@
-//! Ties: nodes that follow others, x = J x_nodes, such as those of a vessel inside an organ or of a wall
-//! whose mesh does not match the surface below it. They have no equations of their own: forces on them and
-//! their masses go to the nodes that they follow, f += Jᵀ f and m += Jᵀ m, by the same rows. Along components
-//! that a constraint holds or moves a node does not follow; forces there are the reaction.
+//! Ties: nodes that follow others, x = J x_nodes. Examples are the nodes of a vessel inside an organ, or of a
+//! wall whose mesh does not match the surface below it. Tied nodes have no equations. Their forces and masses
+//! go to the nodes that they follow, f += Jᵀ f and m += Jᵀ m, by the same rows. A node does not follow along
+//! components that a constraint holds or moves; forces there are the reaction.
 
 use crate::mapping::Weights;
 use crate::tensor::Vector;
@@ -13,7 +13,7 @@ pub struct Tie {
     pub name: String,
     /// The nodes that follow.
     pub nodes: Vec<u32>,
-    /// How each follows, in their order. Each row sums to 1.
+    /// Weights of the followed nodes for each tied node, in their order. Each row sums to 1.
     pub mapping: Weights,
     /// The components of each that a constraint holds or moves; see
     /// [`Model::prescribe_tied`](crate::Model::prescribe_tied).
@@ -40,10 +40,10 @@ impl Tie {
     }
 }
 
-/// Why nodes cannot follow others.
+/// Reasons why nodes cannot follow others.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TieError {
-    /// It follows others by another tie.
+    /// The node follows others by another tie.
     #[error("node {node} of `{body}` is tied already, by `{other}`")]
     Twice {
         /// The node, numbered in its body.
@@ -53,7 +53,7 @@ pub enum TieError {
         /// The other tie.
         other: String,
     },
-    /// What it follows follows others, or itself.
+    /// A followed node follows others, or itself.
     #[error(
         "node {node} of `{body}` would follow nodes that follow others by `{other}`: ties make no chains and no circles"
     )]

@@ -1,7 +1,7 @@
-//! Meshes the real organs of a folder in tets of two edges each (a 16th and a 32nd of the diagonal) and
-//! prints how sound they are: `PLIANT_DATA=FOLDER cargo run --release -p pliant-meshing --example bodies --
-//! [OUT] [NAME…]`. OUT gets the meshes (`-` for none), and names choose the bodies that contain one of them.
-//! The folder is laid out as the tests name it.
+//! Meshes the real organs of a folder in tets of two edges each (a 16th and a 32nd of the diagonal). Prints
+//! how sound the meshes are: `PLIANT_DATA=FOLDER cargo run --release -p pliant-meshing --example bodies --
+//! [OUT] [NAME…]`. OUT gets the meshes (`-` for none). Only bodies whose names contain one of the NAMEs are
+//! meshed. The tests describe the layout of the folder.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;

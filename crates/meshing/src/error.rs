@@ -8,7 +8,7 @@ pub enum MeshingError {
     /// A length or a factor is zero, negative, infinite or NaN.
     #[error("{what} is {value}; it must be positive and finite")]
     NotPositive {
-        /// Which quantity.
+        /// Name of the quantity.
         what: &'static str,
         /// Its value.
         value: f64,
@@ -21,7 +21,7 @@ pub enum MeshingError {
         /// Requested fraction of the ideal.
         target: f64,
     },
-    /// Cells that differ too much in size.
+    /// The cells differ too much in size.
     #[error(
         "cells of {} m beside cells of {} m are too small; the limit is {} m", rounded(*asked), rounded(*edge), rounded(*smallest)
     )]
@@ -38,13 +38,13 @@ pub enum MeshingError {
     NoSuchLabel {
         /// The label.
         label: i32,
-        /// Those of the mesh.
+        /// The labels of the mesh.
         labels: Vec<i32>,
     },
     /// A position has an infinite or NaN coordinate.
     #[error("{what} is ({}, {}, {}) m; it must be finite", value.x, value.y, value.z)]
     NotFinite {
-        /// Which position.
+        /// Name of the position.
         what: &'static str,
         /// Its value.
         value: Vector3,
@@ -147,7 +147,7 @@ pub enum MeshingError {
     FieldNotFinite {
         /// Value found.
         value: f64,
-        /// Where [m].
+        /// Place of this value [m].
         point: Vector3,
     },
     /// The body reaches beyond its own box.
@@ -166,7 +166,7 @@ fn rounded(length: f64) -> f64 {
     (length * 1e6).round() / 1e6
 }
 
-/// By how much the edge must grow for the cells to fit, rounded up to two decimals.
+/// Factor by which the edge must grow for the cells to fit, rounded up to two decimals.
 fn factor(estimate: u64, limit: usize) -> f64 {
     ((estimate as f64 / limit.max(1) as f64).cbrt() * 100.0).ceil() / 100.0
 }

@@ -1,5 +1,5 @@
 //! Curved shells of closed surfaces that fold: a flap, a thin gap, a sharp rim. Normals stand within 60° of
-//! their triangles, or there are none; shells do not cross; what the report tells is what the mesh holds.
+//! their triangles, or are left out; shells do not cross; the report agrees with the mesh.
 
 use pliant_geometry::{CellKind, Mesh, Vector3};
 use pliant_meshing::{DEFAULT_CELL_LIMIT, FittedShells, Flaw, ImplicitField, ShellGoal, TriangleMesh};
@@ -36,7 +36,7 @@ fn fold(x: &Vector3) -> f64 {
     slab(x, [0.0; 3], [0.015, 0.008, 0.00375]).min(-slab(x, [0.005, 0.0, 0.0], [0.015, 0.02, 0.00075]))
 }
 
-/// What two balls have in common: a lens whose faces meet at 52°.
+/// Common part of two balls: a lens whose faces meet at 52°.
 fn lens(x: &Vector3) -> f64 {
     ball(x, [0.0, 0.0, 0.027], 0.03).min(ball(x, [0.0, 0.0, -0.027], 0.03))
 }
@@ -107,8 +107,8 @@ impl ImplicitField for Vessels {
     }
 }
 
-/// 145,000 triangles: few flat ones have lost vessels, so the fit starts from more, reaches the goal within
-/// the work allowed, and no shells cross.
+/// 145,000 triangles: few flat triangles have lost vessels, so the fit starts from more. It reaches the goal
+/// within the work allowed, and no shells cross.
 #[test]
 #[ignore = "about a minute"]
 fn a_large_organ_with_vessels_is_fitted_without_crossings() {
@@ -140,7 +140,7 @@ fn normals_stand_on_their_triangles_at_flaps_and_sharp_rims() {
     }
 }
 
-/// 1 % is out of reach; the report says so, of the shells that were repaired.
+/// 1 % is out of reach; the report of the repaired shells must say so.
 #[test]
 #[ignore = "about a minute each"]
 fn shells_of_a_fold_do_not_cross_where_the_goal_is_out_of_reach() {

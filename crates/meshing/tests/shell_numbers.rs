@@ -33,7 +33,7 @@ fn told(name: &str, target: &TriangleMesh, goal: ShellGoal) -> FittedShells {
     fitted
 }
 
-/// How far points are from the ends of the cylinder, were they on one: from the chords of 320 round.
+/// Distance of a point from the rims of the cylinder, which are chains of 320 chords.
 fn off_the_rim(x: &Vector3) -> f64 {
     let half = TAU / 640.0;
     let within = x.y.atan2(x.x).rem_euclid(2.0 * half) - half;

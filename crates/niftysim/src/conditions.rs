@@ -12,7 +12,7 @@ use super::xml::{
     numbers, numbers_of, run_of_indices,
 };
 
-/// How a load grows with t/T, T the total time.
+/// Growth of a load with t/T, T the total time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum LoadShape {
     /// 10s³ − 15s⁴ + 6s⁵.
@@ -27,7 +27,7 @@ pub(super) enum LoadShape {
     Hilly,
 }
 
-/// What a constraint of NiftySim does.
+/// Action of a constraint of NiftySim.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Action {
     /// Holds components.
@@ -63,7 +63,7 @@ pub(super) struct Condition {
 #[derive(Debug, Default)]
 pub(super) struct Remarks {
     pub notes: Vec<String>,
-    /// What was left out.
+    /// Parts of the model that were left out.
     pub missing: Vec<String>,
 }
 
@@ -130,7 +130,7 @@ impl ConditionReader<'_> {
         vec![Condition { line: line(of), action, shape, nodes, values: Vec::new(), faces: Vec::new() }]
     }
 
-    /// A displacement or force: one condition for each different magnitude.
+    /// Reads a displacement or force as one condition for each different magnitude.
     fn valued(
         &mut self,
         of: XmlElement<'_>,
@@ -222,7 +222,7 @@ impl ConditionReader<'_> {
         }
     }
 
-    /// The forces on the nodes of faces that each have a traction of their own.
+    /// The forces on the nodes of faces that each have their own traction.
     fn traction_of_each_face(
         &mut self,
         of: XmlElement<'_>,
@@ -309,8 +309,8 @@ impl ConditionReader<'_> {
         Ok(Selection::Normal { direction: numbers_of::<3>(normal, "components")?, within })
     }
 
-    /// The faces of a constraint that lie on the boundary, each turned outwards: those given so, and those
-    /// given the other way round.
+    /// The faces of a constraint that lie on the boundary, each turned outwards. Faces listed outwards come
+    /// first, then faces listed inwards.
     fn faces(&mut self, of: XmlElement<'_>) -> Result<[Vec<Vec<u32>>; 2], Fault> {
         let listed = self.listed_faces(of)?;
         Ok(self.turn_outwards(of, &listed))
@@ -397,7 +397,7 @@ fn components(of: XmlElement<'_>) -> Result<[bool; 3], Fault> {
     }
 }
 
-/// What nodes chosen by their normals are restricted to.
+/// Region that nodes chosen by their normals are restricted to.
 fn region(of: XmlElement<'_>) -> Result<Selection, Fault> {
     match attribute(of, "Type", "Type=\"Box\" or \"Sphere\"")? {
         "Box" => {
@@ -428,8 +428,8 @@ fn repeated(nodes: &[u32]) -> Option<u32> {
     nodes.windows(2).find(|pair| pair[0] == pair[1]).map(|pair| pair[0])
 }
 
-/// What the conditions of one body come to together: where NiftySim both holds and displaces, it displaces;
-/// what acts on the same nodes along other axes becomes one.
+/// Combines the conditions of one body. Where NiftySim both holds and displaces, it displaces. Actions on the
+/// same nodes along other axes become one.
 pub(super) fn settle(conditions: Vec<Condition>) -> Result<Vec<Condition>, Fault> {
     let mut moved: [BTreeSet<u32>; 3] = Default::default();
     for condition in &conditions {
@@ -459,7 +459,7 @@ pub(super) fn settle(conditions: Vec<Condition>) -> Result<Vec<Condition>, Fault
     Ok(gathered(settled))
 }
 
-/// One condition for those of a constraint that differ in their values only.
+/// Gathers conditions of one constraint that differ in their values only.
 fn gathered(conditions: Vec<Condition>) -> Vec<Condition> {
     /// The vector of an action on nodes, and the components in which it acts.
     fn vector(action: &Action) -> Option<([f64; 3], [bool; 3])> {

@@ -2,8 +2,8 @@
 //! bodies that touch each other.
 //!
 //! Plates, cylinders and probes move by POLY345, surfaces in proportion to time. NiftySim moves single nodes
-//! out of them; a scene keeps out the faces whose nodes they are. Leaves out: `<KinematicContact>`, and what
-//! [`Remarks::missing`] names.
+//! out of these rigid things; a scene keeps out the faces of these nodes. Leaves out: `<KinematicContact>`,
+//! and the items of [`Remarks::missing`].
 
 use std::collections::BTreeSet;
 
@@ -21,26 +21,26 @@ use super::xml::{
     run_of_indices,
 };
 
-/// Cosine of the angle between the edges of a plate from which on it is no rectangle.
+/// Largest cosine of the angle between the edges of a plate that counts as a rectangle.
 const RECTANGLE: f64 = 1e-3;
 /// Rows of a table of poses.
 const POSES: u32 = 1000;
 
-/// What touches.
+/// Contacts of a model.
 #[derive(Debug, Default)]
 pub(super) struct Contact {
     /// Rigid things.
     pub things: Vec<Thing>,
-    /// How bodies touch each other, if they do.
+    /// Contact of bodies with each other, if any.
     pub bodies: Option<Bodies>,
     /// Distance that surfaces of rigid meshes and bodies keep [m].
     pub margin: f64,
 }
 
-/// How bodies touch each other.
+/// Contact of bodies with each other.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bodies {
-    /// Whether a body also touches itself.
+    /// True if a body also touches itself.
     pub themselves: bool,
     pub friction: f64,
 }
@@ -53,12 +53,12 @@ pub(super) struct Thing {
     /// `plate`, `cylinder`, `probe` or `surface`.
     pub kind: &'static str,
     pub form: RigidForm,
-    /// Where the origin of its frame is [m].
+    /// Origin of its frame [m].
     pub at: [f64; 3],
-    /// How its frame is turned [rad]: about this vector by its length.
+    /// Turn of its frame [rad]: about this vector by its length.
     pub turn: [f64; 3],
     pub motion: RigidMotion,
-    /// By how much its radius grows [m], along POLY345.
+    /// Growth of its radius [m], along POLY345.
     pub growth: f64,
     /// The nodes of the model that touch it; all if not given.
     pub nodes: Option<BTreeSet<u32>>,
@@ -76,11 +76,11 @@ pub(super) enum RigidForm {
     Cylinder([f64; 2]),
     /// Radius and length of the segment [m].
     Capsule([f64; 2]),
-    /// What a closed surface encloses; with bodies inside of it if it faces inward.
+    /// The inside of a closed surface. If the surface faces inward, bodies are inside.
     Mesh { mesh: Mesh, inside: bool },
 }
 
-/// How a rigid thing moves.
+/// Motion of a rigid thing.
 #[derive(Debug)]
 pub(super) enum RigidMotion {
     Rest,
@@ -98,7 +98,7 @@ pub(super) enum RigidMotion {
     Poses(Vec<[f64; 8]>),
 }
 
-/// Reads the contacts of a model of so many nodes.
+/// Reads the contacts of a model of `nodes` nodes.
 pub(super) fn read(
     root: XmlElement<'_>,
     nodes: usize,
@@ -350,7 +350,7 @@ impl ContactReader<'_> {
             let place = centre + shift * part - turn * centre;
             [time, place.x, place.y, place.z, turn.w, turn.i, turn.j, turn.k]
         };
-        // One more, so that it still moves at the end.
+        // One row more, so that it still moves at the end.
         (0..=POSES + 1).map(row).collect()
     }
 
@@ -392,7 +392,7 @@ fn shift(of: XmlElement<'_>, name: &'static str) -> Result<RigidMotion, Fault> {
     Ok(if by == [0.0; 3] { RigidMotion::Rest } else { RigidMotion::Smooth(by) })
 }
 
-/// A number of at least 0, which is 0 if it is not given.
+/// A number of at least 0; 0 if it is not given.
 fn at_least_0(of: XmlElement<'_>, name: &'static str, what: &'static str) -> Result<f64, Fault> {
     let Some(of) = child(of, name) else { return Ok(0.0) };
     let value = number(of)?;

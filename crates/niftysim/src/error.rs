@@ -1,4 +1,4 @@
-//! What can be wrong with a NiftySim model, where, and what to do about it.
+//! Errors of a NiftySim model, with their place and remedy.
 
 use std::path::PathBuf;
 
@@ -13,7 +13,7 @@ pub enum ImportError {
     File {
         /// The file.
         path: PathBuf,
-        /// What the operating system says.
+        /// Message of the operating system.
         reason: String,
     },
     /// The file is not XML.
@@ -26,10 +26,10 @@ pub enum ImportError {
         path: PathBuf,
         /// The line, from 1.
         line: usize,
-        /// What the XML reader says.
+        /// Message of the XML reader.
         reason: String,
     },
-    /// An element of the XML says what it cannot mean.
+    /// An element of the XML has an impossible value.
     #[error("`{}`, line {line}, <{element}>: {problem}", path.display())]
     Content {
         /// The file.
@@ -38,12 +38,12 @@ pub enum ImportError {
         line: u32,
         /// Its name.
         element: String,
-        /// What is wrong with it.
+        /// The problem.
         problem: ImportProblem,
     },
 }
 
-/// What is wrong with an element of the XML.
+/// A problem of an element of the XML.
 #[derive(Debug, thiserror::Error)]
 pub enum ImportProblem {
     /// The file is XML of another kind.
@@ -54,7 +54,7 @@ pub enum ImportProblem {
     MissingElement {
         /// The child.
         wanted: &'static str,
-        /// How it looks.
+        /// An example of the element.
         example: &'static str,
     },
     /// An attribute that must be there is not.
@@ -62,7 +62,7 @@ pub enum ImportProblem {
     MissingAttribute {
         /// The attribute.
         wanted: &'static str,
-        /// How it looks.
+        /// An example of the attribute.
         example: &'static str,
     },
     /// A text where a number must be.
@@ -76,21 +76,21 @@ pub enum ImportProblem {
     /// A list is too long or too short.
     #[error("found {found} {what}, expected {wanted}; correct the list or its count")]
     Count {
-        /// What is counted.
+        /// The items counted.
         what: &'static str,
-        /// How many there are.
+        /// Number of items found.
         found: usize,
-        /// How many there should be.
+        /// Number of items needed.
         wanted: String,
     },
     /// A number is out of its range.
     #[error("{what} is {value}, but must be {range}; correct it")]
     OutOfRange {
-        /// Which number.
+        /// Name of the number.
         what: &'static str,
         /// The number.
         value: f64,
-        /// What it has to be.
+        /// The valid range.
         range: &'static str,
     },
     /// An index of something that does not exist.
@@ -100,25 +100,25 @@ pub enum ImportProblem {
         of: &'static str,
         /// The index found.
         index: i64,
-        /// How many there are.
+        /// Number of existing items.
         count: usize,
     },
     /// A word with no meaning here.
     #[error("`{found}` is not a known {what}; known: {known}")]
     Unknown {
-        /// What the word should be.
+        /// The kind of word needed.
         what: &'static str,
         /// The word found.
         found: String,
         /// The words that are known.
         known: &'static str,
     },
-    /// Two statements that do not go together.
+    /// Two statements contradict each other.
     #[error("{what}; {remedy}")]
     Contradiction {
         /// Both, with their numbers.
         what: String,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
     /// Nodes chosen by their normals could not be.

@@ -88,7 +88,7 @@ impl Geometry {
         self.cells().len() / self.solid.cell().node_count()
     }
 
-    /// How many parts have no node in common.
+    /// Number of parts without a common node.
     pub(crate) fn piece_count(&self) -> usize {
         let mut pieces = DisjointSets::new(self.node_count());
         let mut used = vec![false; self.node_count()];
@@ -135,7 +135,7 @@ fn listed(of: XmlElement<'_>) -> Result<Geometry, Fault> {
     Ok(Geometry::new(solid, points, cells))
 }
 
-/// Whether as many numbers are listed as the attribute says, or whole items where it is missing.
+/// Checks that as many numbers are listed as the attribute says, or whole items where it is missing.
 pub(super) fn check_listed(
     of: XmlElement<'_>,
     name: &str,

@@ -1,10 +1,10 @@
-//! Reads models of NiftySim (UCL; XML) and says the same as a scene and its mesh files.
+//! Reads models of NiftySim (UCL; XML) and translates them to a scene and its mesh files.
 //!
-//! What NiftySim computes is kept, also where it is not what its guide says: the published fibre modulus,
-//! hourglass stiffness by λ + 2μ, backward Euler for relaxation, tractions that pull against the vector they
-//! are given by. The notes name each. Load shapes act at the same steps as NiftySim's, which sets a load
-//! after a step for the next one. Leaves out: shells that bend, radii that change, reduced bases, values read
-//! from files; [`Imported::missing`] names them.
+//! The scene computes the same as NiftySim, also where its guide differs. Examples are the published fibre
+//! modulus and hourglass stiffness by λ + 2μ. Others are backward Euler for relaxation, and tractions that
+//! pull against the given vector. The notes name each. Load shapes act at the same steps as in NiftySim,
+//! which sets a load after a step for the next one. Leaves out: shells that bend, radii that change, reduced
+//! bases, values read from files; [`Imported::missing`] names them.
 //!
 //! ```
 //! let imported = pliant_niftysim::import("../../lab/validation/data/niftysim/H8_NH.xml".as_ref())?;
@@ -34,14 +34,15 @@ use pliant_geometry::io::{self, MeshFile, MeshFileError, parse_xml};
 
 pub use error::{ImportError, ImportProblem};
 
-/// Where mesh files of a model are.
+/// Source of the mesh files of a model.
 struct Files<'a> {
     folder: &'a Path,
     reads: &'a Reads,
 }
 
 impl Files<'_> {
-    /// Reads a mesh beside the model; else in the working directory, which is all that NiftySim itself knows.
+    /// Reads a mesh from the folder of the model, else from the working directory, the only place where
+    /// NiftySim itself looks.
     fn mesh(&self, name: &str) -> Result<MeshFile, MeshFileError> {
         let read = |path: &Path| {
             let allowed = self.reads.allow(path);
@@ -56,7 +57,7 @@ impl Files<'_> {
     }
 }
 
-/// A scene that says what a NiftySim model says.
+/// A NiftySim model translated to a scene.
 #[derive(Clone, Debug)]
 pub struct Imported {
     /// The text of a scene file.
@@ -66,7 +67,7 @@ pub struct Imported {
     pub meshes: Vec<(String, Mesh)>,
     /// The tables that it names, with their file names, as text.
     pub tables: Vec<(String, String)>,
-    /// What is worth knowing of the translation, a sentence each; what was left out is one of them.
+    /// Notes on the translation, a sentence each; one names the parts left out.
     pub notes: Vec<String>,
     /// Parts of the model that the scene does not have. Unless this is empty, the scene is another model.
     pub missing: Vec<String>,
@@ -80,7 +81,7 @@ pub fn import(path: &Path) -> Result<Imported, ImportError> {
     import_within(path, &Reads::anywhere())
 }
 
-/// As [`import`], with the files that may be read.
+/// Imports a model like [`import`], with the files that may be read.
 ///
 /// # Errors
 /// If a file can't or may not be read, or the model says something that it cannot mean.

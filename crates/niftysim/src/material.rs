@@ -19,7 +19,7 @@ pub(super) enum Elastic {
     Linear([f64; 2]),
 }
 
-/// A material: an elastic law, and what of it relaxes.
+/// A material: an elastic law, and its relaxing parts.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Material {
     /// The type in NiftySim.
@@ -146,7 +146,7 @@ impl Elastic {
         }
     }
 
-    /// μ and κ [Pa] by which NiftySim scales its hourglass stiffness; of Arruda and Boyce's law the
+    /// μ and κ [Pa] by which NiftySim scales its hourglass stiffness. For Arruda and Boyce's law μ is the
     /// coefficient.
     fn niftysim_moduli(&self) -> [f64; 2] {
         match *self {

@@ -19,7 +19,7 @@ use super::xml::{
 /// A model.
 #[derive(Debug)]
 pub(super) struct Model {
-    /// What becomes bodies: submodels, or one for all.
+    /// The future bodies: submodels, or one for all.
     pub parts: Vec<SubModel>,
     pub materials: Vec<Material>,
     pub contact: Contact,
@@ -178,7 +178,7 @@ impl Model {
         Ok((Geometry { solid, mesh }, maps))
     }
 
-    /// What of the model a scene has no words for yet.
+    /// Names the parts of the model that a scene cannot express.
     fn name_what_is_missing(&mut self, root: XmlElement<'_>) {
         let missing = &mut self.remarks.missing;
         for submodel in children(root, "SubModel") {

@@ -87,14 +87,14 @@ fn split(cells: &[u32], corners: usize) -> Vec<[u32; 3]> {
 }
 
 impl RigidSurface {
-    /// A closed surface as a mesh, whether bodies are inside of it, and the thickness [m] that a sheet got;
-    /// or why there is none.
+    /// Makes a mesh of a closed surface. Also returns whether bodies are inside, and the thickness [m] that a
+    /// sheet got. The error says why no mesh is possible.
     pub fn solid(self) -> Result<(Mesh, bool, Option<f64>), String> {
         let Self { points, triangles } = self.welded();
         if triangles.is_empty() {
             return Err("none of its triangles has three corners apart; give it an area".into());
         }
-        // How often each edge is gone along, from the smaller to the larger node and back.
+        // Number of times that each edge is passed, from the smaller to the larger node and back.
         let mut edges: BTreeMap<[u32; 2], [u32; 2]> = BTreeMap::new();
         for &[a, b, c] in &triangles {
             for [from, to] in [[a, b], [b, c], [c, a]] {
@@ -143,7 +143,7 @@ impl RigidSurface {
         Ok((mesh([points, behind].concat(), &all), false, Some(depth)))
     }
 
-    /// Points at one place become one, and triangles without an area go.
+    /// Joins points at one place, and drops triangles without area.
     fn welded(self) -> Self {
         let mut known: BTreeMap<[u64; 3], u32> = BTreeMap::new();
         let mut points = Vec::new();

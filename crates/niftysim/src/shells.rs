@@ -2,8 +2,8 @@
 //! bent.
 //!
 //! `NeoHookean` is the incompressible law S = μ (I − λ₃² C⁻¹), a neo-Hookean membrane with ν = 0.5 and E = 3
-//! μ. `Linear` is linear in the displacements, with axes that stay those at rest; the membrane of St Venant
-//! and Kirchhoff with the same E and ν is it for small ones. Leaves out: shells that bend, and shells on
+//! μ. `Linear` is linear in the displacements, with the axes at rest. For small displacements it equals the
+//! membrane of St Venant and Kirchhoff with the same E and ν. Leaves out: shells that bend, and shells on
 //! hexahedra; [`Remarks::missing`] names them.
 
 use pliant_geometry::boundary;
@@ -130,7 +130,7 @@ fn triangles(of: XmlElement<'_>, kind: &str, geometry: &Geometry) -> Result<Vec<
     }
 }
 
-/// The elements of a set, of so many.
+/// Reads the elements of a set, out of `all`.
 fn members(set: XmlElement<'_>, all: usize) -> Result<Vec<u32>, Fault> {
     match attribute(set, "Size", "Size=\"all\" or a number")? {
         "all" => Ok((0..all as u32).collect()),
@@ -142,7 +142,7 @@ fn members(set: XmlElement<'_>, all: usize) -> Result<Vec<u32>, Fault> {
     }
 }
 
-/// The membrane of a set, still without triangles; `None` of one that bends, which is left out.
+/// The membrane of a set, still without triangles; `None` if it bends, which is left out.
 fn without_faces(set: XmlElement<'_>, remarks: &mut Remarks) -> Result<Option<Membrane>, Fault> {
     let line = line(set);
     let material = needed(set, "Material", MATERIAL)?;
@@ -159,7 +159,7 @@ fn without_faces(set: XmlElement<'_>, remarks: &mut Remarks) -> Result<Option<Me
     Ok(Some(Membrane { line, law, density, thickness, faces: Vec::new() }))
 }
 
-/// The law of a material; `None` of one that bends.
+/// The law of a material; `None` if it bends.
 fn law(of: XmlElement<'_>) -> Result<Option<MembraneLaw>, Fault> {
     let known = "Linear, NeoHookean, LinearShell, LinearThickShell";
     let name = attribute(of, "Type", "Type=\"Linear\" or \"NeoHookean\"")?;

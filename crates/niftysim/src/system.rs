@@ -19,9 +19,9 @@ pub(super) struct System {
     pub hourglass: Option<f64>,
 }
 
-/// More steps than anyone takes.
+/// Most steps accepted; no model takes as many.
 const MOST_STEPS: f64 = 1e12;
-/// How to write the settings, for messages.
+/// Syntax of the settings, for messages.
 pub(super) const SYSTEM: &str = "<SystemParams> with <TimeStep>, <TotalTime> and <DampingCoeff>";
 
 impl System {
@@ -54,8 +54,8 @@ impl System {
 }
 
 impl System {
-    /// The end of NiftySim's last step [s]: it takes one more than the total time holds, and its outputs come
-    /// after it.
+    /// The end of NiftySim's last step [s]. NiftySim takes one step more than the total time holds, and
+    /// writes its outputs after this step.
     pub fn end(&self) -> f64 {
         let end = ((self.total / self.step).round() + 1.0) * self.step;
         // Rid of the product's round-off, which would be read as intention.

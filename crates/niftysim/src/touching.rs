@@ -15,11 +15,11 @@ pub(super) struct Touching {
     contact: Contact,
     /// Names of the things in the scene.
     names: Vec<String>,
-    /// Which of them have nodes on the boundary of a body.
+    /// True for each thing that touches nodes on the boundary of a body.
     met: Vec<bool>,
-    /// Names of the bodies, and of how many pieces they are.
+    /// Names of the bodies, and their numbers of pieces.
     bodies: Vec<(String, usize)>,
-    /// Whether there are several bodies.
+    /// True if there are several bodies.
     several: bool,
     tables: String,
 }
@@ -33,13 +33,13 @@ impl Touching {
         Self { contact, names, met, bodies: Vec::new(), several, tables: String::new() }
     }
 
-    /// Whether the number of pieces of a body matters.
+    /// True if the number of pieces of a body matters.
     pub(crate) fn asks_for_pieces(&self) -> bool {
         self.contact.bodies.is_some_and(|bodies| !bodies.themselves)
     }
 
-    /// What a body touches; its nodes begin at a number of the whole model. The faces that touch become sets
-    /// of its mesh.
+    /// Adds the contacts of a body with rigid things. The nodes of the body begin at `first` in the whole
+    /// model. The faces that touch become sets of its mesh.
     pub fn body(
         &mut self,
         writer: &mut Writer,
@@ -125,7 +125,7 @@ impl Touching {
     }
 }
 
-/// Friction and distance of a contact, and an empty line. Bodies that keep none say so.
+/// Friction and distance of a contact, and an empty line. The distance is left out if it is not given.
 fn how(friction: f64, thickness: Option<f64>) -> String {
     let mut lines = format!("friction = {friction:?}\n");
     if let Some(thickness) = thickness {

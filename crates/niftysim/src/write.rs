@@ -96,7 +96,8 @@ fn by_label(regions: &[Region], value: impl Fn(&Region) -> String) -> String {
 }
 
 impl Writer {
-    /// The mesh of a part, whose nodes begin at a number of the whole model; its tables are written.
+    /// Builds the mesh of a part and writes its tables. The nodes of the part begin at a number of the whole
+    /// model.
     fn part(
         &mut self,
         part: SubModel,

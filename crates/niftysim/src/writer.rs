@@ -9,8 +9,7 @@ use super::geometry::Solid;
 use super::material::Material;
 use super::system::System;
 
-/// Most pairs by which the curve HILLY is written: one for each step, or straight lines between them that are
-/// off by 1e-5 at the most.
+/// Most pairs of the written curve HILLY: one for each step, or straight lines with an error of at most 1e-5.
 const HILLY_POINTS: f64 = 2000.0;
 /// π as NiftySim has it, in the curve HILLY.
 #[expect(clippy::approx_constant, reason = "NiftySim's")]
@@ -26,7 +25,7 @@ pub(super) struct Writer {
     pub tables: String,
     pub notes: Vec<String>,
     pub missing: Vec<String>,
-    /// How many tables of each name there are.
+    /// Number of tables of each name.
     pub numbers: BTreeMap<&'static str, usize>,
     /// Tables of poses, with their file names.
     pub files: Vec<(String, String)>,
@@ -69,7 +68,7 @@ impl Writer {
             }
             LoadShape::Step => {
                 self.line("curve = \"hold\"".into());
-                // Nodes that jump while the run goes on would throw its energies off balance.
+                // Nodes that jump during the run would throw its energies off balance.
                 if moves {
                     self.note("STEP of a Disp: the nodes start displaced; NiftySim displaces them in its first step");
                     return;
@@ -115,11 +114,11 @@ impl Writer {
     }
 }
 
-/// How faces became a set of a mesh.
+/// Outcome of the conversion of faces to a set of a mesh.
 pub(super) struct Faces {
-    /// How many of them are on the boundary.
+    /// Number of faces on the boundary.
     pub outside: usize,
-    /// How many are not.
+    /// Number of other faces.
     pub inside: usize,
     /// True if they are the whole boundary, which needs no set.
     pub all: bool,

@@ -44,7 +44,7 @@ pub(super) fn attribute<'a>(
     found.ok_or_else(|| fault(of, ImportProblem::MissingAttribute { wanted: name, example }))
 }
 
-/// The words of an element's own text: that of its children does not count.
+/// The words of an element's own text, without the text of its children.
 fn words(of: XmlElement<'_>) -> impl Iterator<Item = &str> {
     let texts = of.children().filter(|child| child.is_text());
     texts.filter_map(|text| text.text()).flat_map(str::split_ascii_whitespace)
@@ -125,7 +125,7 @@ pub(super) fn run_of_indices(
     }
 }
 
-/// Whether a child is a switch that is on.
+/// True if a child is a switch that is on.
 pub(super) fn is_on(of: XmlElement<'_>, name: &'static str) -> bool {
     child(of, name).is_some_and(|switch| !matches!(text(switch).as_str(), "" | "0"))
 }

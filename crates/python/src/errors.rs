@@ -9,16 +9,16 @@ use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// Why a call can't do what it was asked for.
+/// Reason why a call fails.
 #[derive(Debug)]
 pub enum Trouble {
     /// Mistakes in a scene.
     Scene(Box<SceneErrors>),
-    /// A simulation that can't go on.
+    /// A simulation that has failed.
     Failure(Box<Failure>),
     /// A file that can't be written.
     Output(OutputError),
-    /// A checkpoint that a run can't go on from.
+    /// A checkpoint that a run can't resume from.
     Resume(Box<ResumeError>),
     /// A mesh or an image that can't be used: its file, and why.
     Mesh(Option<String>, String),

@@ -14,8 +14,8 @@ use crate::errors::Trouble;
 /// Time between two looks at signals.
 const SLICE: Duration = Duration::from_millis(50);
 
-/// Runs a job on a pool. What a signal raises ends it through `stop`, is waited for, and then raised; the
-/// result comes with it.
+/// Runs a job on a pool. An exception from a signal stops the job through `stop`; the call waits for the job
+/// and returns the exception with the result.
 pub fn on_pool<T: Send + 'static>(
     py: Python<'_>,
     pool: &rayon::ThreadPool,
@@ -74,8 +74,8 @@ pub fn on_thread<T: Send + 'static>(
     }
 }
 
-/// Time for which the result of a call is awaited awake at first: to wake a thread takes longer than a short
-/// step, and that of the pool goes to sleep meanwhile.
+/// Time for which a call waits awake for its result at first. To wake a thread takes longer than a short
+/// step, and the thread of the pool goes to sleep meanwhile.
 const AWAKE: Duration = Duration::from_micros(200);
 
 /// Waits for a slice of time without the interpreter, at first awake.

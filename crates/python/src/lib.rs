@@ -1,5 +1,5 @@
 //! The native half of the Python package `pliant`: the public classes are Python (`python/pliant`), and call
-//! what is here.
+//! these functions.
 //!
 //! A simulation is owned and `Send`, so a call that computes moves it to a pool of its own threads and back.
 //! The caller waits without the interpreter and looks at signals every 50 ms.
@@ -20,7 +20,7 @@ use std::ffi::OsString;
 
 use pyo3::prelude::*;
 
-/// Does what a command line says; the code that the process is to end with.
+/// Executes a command line; returns the exit code.
 #[pyfunction]
 fn main(py: Python<'_>, words: Vec<OsString>) -> u8 {
     py.detach(|| pliant_command::main(words))

@@ -37,7 +37,7 @@ pub fn word(kind: CellKind) -> &'static str {
 type Blocks<'py> = Vec<(String, PyReadonlyArray2<'py, u32>)>;
 type Data<'py> = Vec<(String, PyReadonlyArray2<'py, f64>)>;
 
-/// A name, a kind of cells, and a value for each of them.
+/// A name, a kind of cells, and a value for each cell.
 type CellData<'py> = (String, &'static str, Bound<'py, PyArray2<f64>>);
 
 /// A name, a kind of cells, and which of them are in a set.
@@ -109,7 +109,7 @@ impl Mesh {
         })
     }
 
-    /// To a file whose ending tells its format.
+    /// Writes a file; its ending gives the format.
     fn write(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let mesh = Arc::clone(&self.0);
         crate::jobs::on_thread(py, move || {

@@ -30,7 +30,7 @@ impl Model {
     }
 }
 
-/// How a run with files is done.
+/// Options of a run with files.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct RunOptions {
@@ -102,7 +102,7 @@ impl Model {
         .into()
     }
 
-    /// Names and units of what is sampled.
+    /// Names and units of the sampled columns.
     fn columns(&self) -> Vec<(String, &'static str)> {
         sampled_columns(&self.world).into_iter().map(|own| (own.name, own.unit)).collect()
     }
@@ -115,7 +115,7 @@ impl Model {
         diagnostics(py, &self.world.scene.source.errors(self.world.warnings().cloned().collect()))
     }
 
-    /// The same with another duration [s].
+    /// Returns this model with another duration [s].
     fn lasting(&self, until: f64) -> Self {
         Self { world: Arc::new(self.world.lasting(until)) }
     }
@@ -196,7 +196,7 @@ impl Model {
     }
 }
 
-/// Names of contacts; of one between several things, those of its pairs.
+/// Returns the names of contacts; for a contact between several things, the names of its pairs.
 pub fn contact_names(world: &World) -> Vec<String> {
     let all = world.participants.iter().filter_map(|part| part.built.contacts.as_ref());
     let mut names: Vec<String> =
@@ -206,7 +206,7 @@ pub fn contact_names(world: &World) -> Vec<String> {
     names
 }
 
-/// Kinetic, internal, damping, external and hourglass energy and that of step changes [J], and the balance.
+/// Kinetic, internal, damping, external, hourglass and step-change energy [J], and the balance.
 pub fn in_order(e: &Energies) -> [f64; 7] {
     [e.kinetic, e.internal, e.damping, e.external, e.hourglass, e.step_changes, e.balance]
 }

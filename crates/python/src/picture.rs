@@ -12,7 +12,7 @@ use crate::arrays::array;
 use crate::errors::Trouble;
 use crate::running::Running;
 
-/// What draws, opened once for all.
+/// The graphics device, opened once for all pictures.
 static GRAPHICS: Mutex<Option<Graphics>> = Mutex::new(None);
 
 /// A PNG of the instant as `[view]` shows it, or coloured by another field, seen from another side (azimuth

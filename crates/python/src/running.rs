@@ -1,5 +1,4 @@
-//! What a simulation owns: the run, what is shown of it, and its displacements where the stepper has none of
-//! its own.
+//! The run of a simulation in Python, its displayed data, and its displacements if the stepper keeps none.
 
 use std::sync::Arc;
 
@@ -18,7 +17,7 @@ pub struct Running {
     pub world: Arc<World>,
     /// Displacements [m] in the binding's own memory, of solvers that keep none; filled after each call.
     own: Option<Vec<[f64; 3]>>,
-    /// Where displacements lie, as long as it lives.
+    /// Address of the displacements, fixed as long as the run lives.
     address: usize,
     shown: VtuTable,
     /// Readers of the fields that were asked for.
@@ -59,7 +58,7 @@ impl Running {
         }
     }
 
-    /// Fills the binding's own displacements; an error if those of the stepper have moved.
+    /// Fills the binding's own displacements, if the stepper keeps none.
     pub fn refresh(&mut self) {
         let Some(own) = &mut self.own else { return };
         let parts = self.world.participants.iter().zip(self.live.simulation.instants());
@@ -69,7 +68,7 @@ impl Running {
         own.iter_mut().zip(all).for_each(|(own, now)| *own = now);
     }
 
-    /// Whether displacements lie where views of them look.
+    /// True if displacements lie where views look for them.
     pub fn is_in_place(&self) -> bool {
         self.displacement().address() == self.address
     }

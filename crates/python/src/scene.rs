@@ -25,7 +25,7 @@ type Handed<'py> = (String, String, PathBuf, Vec<String>, Meshes<'py>, BTreeMap<
 
 type Meshes<'py> = BTreeMap<String, Bound<'py, Mesh>>;
 
-/// The same, to be read on another thread.
+/// A handed scene, to be read on another thread.
 struct Taken {
     text: String,
     name: String,

@@ -37,7 +37,7 @@ pub struct Simulation {
 /// The time of a simulation that is not here.
 const AWAY: u64 = f64::NAN.to_bits();
 
-/// Where the run is.
+/// State of the run.
 enum Slot {
     Here(Box<Running>),
     /// A call computes.
@@ -210,7 +210,7 @@ impl Simulation {
         self.quick(|running| running.simulation().fingerprint())
     }
 
-    /// Why it has ended before the last step of its scene.
+    /// Reason why the run has ended before the last step of its scene.
     fn ended(&self) -> Result<Option<String>, Trouble> {
         self.quick(|running| running.simulation().ended().map(str::to_owned))
     }
@@ -264,8 +264,7 @@ impl Simulation {
         Ok(array(py, values, columns))
     }
 
-    /// Kinetic, internal, damping, external and hourglass energy and that of step changes [J], and the
-    /// balance.
+    /// Kinetic, internal, damping, external, hourglass and step-change energy [J], and the balance.
     fn energies(&self, py: Python<'_>) -> PyResult<[f64; 7]> {
         self.work(py, |running, _| {
             running.evaluate()?;
@@ -286,7 +285,7 @@ impl Simulation {
         })
     }
 
-    /// Force [N] of each contact; of one between several things, that of each pair.
+    /// Returns the force [N] of each contact; for a contact between several things, the force of each pair.
     fn contacts(&self, py: Python<'_>) -> PyResult<BTreeMap<String, [f64; 3]>> {
         self.work(py, |running, _| {
             let names = contact_names(&running.world);
@@ -298,7 +297,7 @@ impl Simulation {
         })
     }
 
-    /// Names and units of what is sampled.
+    /// Names and units of the sampled columns.
     fn columns(&self) -> Result<Vec<(String, &'static str)>, Trouble> {
         self.quick(|running| running.live.columns().iter().map(|own| (own.name.clone(), own.unit)).collect())
     }
@@ -313,8 +312,8 @@ impl Simulation {
         })
     }
 
-    /// Goes so many steps on, or until a time [s]; fewer after a signal or where the run ends. The steps
-    /// done.
+    /// Takes a number of steps, or steps until a time [s]; fewer after a signal or at the end of the run.
+    /// Returns the number of steps taken.
     fn advance(&self, py: Python<'_>, steps: Option<u64>, until: Option<f64>) -> PyResult<u64> {
         self.work(py, move |running, stop| {
             let mut done = 0;
@@ -385,8 +384,8 @@ impl Simulation {
         Ok(arrival.map_err(|failure| Trouble::Value(failure.message))?)
     }
 
-    /// A tool: its pose, the angle between its jaws [rad], the force [N] of all that touches it, and its
-    /// moment about the tool's frame [N m].
+    /// Returns a tool: its pose, the angle between its jaws [rad], and the total contact force [N] on it. The
+    /// last value is the moment about the tool's frame [N m].
     fn tool(&self, py: Python<'_>, name: String) -> PyResult<Option<ToolNow>> {
         self.work(py, move |running, _| {
             running.evaluate()?;
@@ -424,7 +423,7 @@ impl Simulation {
         })
     }
 
-    /// Goes on with the numbers of another model. False where its meshes, solvers or precision differ.
+    /// Continues with the numbers of another model. Returns false if its meshes, solvers or precision differ.
     fn exchange(&self, py: Python<'_>, model: &Model) -> PyResult<bool> {
         let world = Arc::clone(&model.world);
         self.work(py, move |running, _| {
@@ -458,7 +457,7 @@ impl Simulation {
         self.work(py, move |running, _| crate::picture::draw(running, field.as_deref(), size, camera))
     }
 
-    /// Ends it. Its memory goes with the last view of it.
+    /// Ends the run. Its memory is freed with the last view.
     fn close(&self) -> Result<(), Trouble> {
         let mut slot = self.slot()?;
         *slot = match std::mem::replace(&mut *slot, Slot::Away) {

@@ -22,7 +22,7 @@ pub struct State {
 #[derive(Clone)]
 enum Snapshot {
     Whole(Arc<pliant_sim::State>),
-    /// As it came from a file or another process, of no world yet.
+    /// Bytes from a file or another process, of no world yet.
     Bytes(Arc<Vec<Vec<u8>>>),
 }
 
@@ -34,7 +34,7 @@ impl State {
         Ok(Self { snapshot, time: simulation.time(), steps: simulation.steps(), displacement })
     }
 
-    /// As a state of the world of a run.
+    /// Returns the state for the world of a run.
     pub fn taken(&self, running: &Running) -> Result<pliant_sim::State, Trouble> {
         let world = running.simulation().world();
         let other =

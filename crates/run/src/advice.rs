@@ -1,5 +1,5 @@
-//! What to try after a failed step. It depends on what the run does already: nobody is told to switch on what
-//! is on, or to damp more where damping is the trouble.
+//! Remedies after a failed step. They depend on what the run does already. No text advises a setting that is
+//! already on, or more damping where damping is the trouble.
 
 use pliant_format::tables::OnUnstableName;
 use pliant_geometry::words::{counted, number};
@@ -9,8 +9,9 @@ use pliant_sim::{Failure, FailureKind, Instant, Precision};
 use pliant_format::tables::SolverName;
 use pliant_scene::{Built, Part};
 
-/// Damping [1/s] times step [s] from which on a step does not resolve the damping: central differences take
-/// (1 − a) / (1 + a) of a velocity over a step, a = ½ damping × step, and 2 turns it round.
+/// Damping [1/s] times step [s] above which a step does not resolve the damping. Over a step central
+/// differences multiply a velocity by (1 − a) / (1 + a), where a = ½ damping × step. From 2 on the velocity
+/// turns round.
 const RESOLVED: f64 = 1.0;
 
 /// The remedy of a failed explicit step, where the run's state says more than the failure itself.
@@ -61,7 +62,8 @@ pub(crate) fn remedy(failure: &Failure, part: &Part, now: &dyn Instant) -> Optio
     Some(message + &pushing(part, now))
 }
 
-/// That moving tools which touch bodies here have no limit of their force.
+/// Advice to limit the force of moving tools that touch these bodies and have no limit; empty without such
+/// tools.
 fn pushing(part: &Part, now: &dyn Instant) -> String {
     let Some(all) = &part.built.contacts else { return String::new() };
     let unlimited = |contact: &Contact| {
@@ -78,7 +80,7 @@ fn pushing(part: &Part, now: &dyn Instant) -> String {
     }
 }
 
-/// That damping is what the steps are too long for, where it is so.
+/// Message if a step is too long for the damping of the body that failed.
 fn too_much_damping(failure: &Failure, built: &Built, step: f64) -> Option<String> {
     let body = built.model.bodies.iter().find(|body| failure.body.as_deref() == Some(&body.name))?;
     (body.damping * step > RESOLVED).then(|| {

@@ -1,10 +1,10 @@
-//! Checkpoints: all that a run needs to go on as if it had never stopped, in one file.
+//! Checkpoints: one file with everything that a run needs to continue as if it had never stopped.
 //!
-//! The file: [`MAGIC`], the [`FORMAT`] (u32), the length of the body (u64), the body in postcard's encoding,
-//! and the CRC-32 of all before it (u32); little-endian. The body: [`Origin`] (what the run was),
-//! [`Progressed`] (how far it and its outputs were), the states of its participants with what a restart needs
-//! beside them, and its rollback points: of each how far the run was, and the states. A file appears under
-//! its name only once it is whole.
+//! The file holds [`MAGIC`], the [`FORMAT`] (u32) and the length of the body (u64). Then come the body in
+//! postcard's encoding and the CRC-32 of all bytes before it (u32). Numbers are little-endian. The body
+//! begins with [`Origin`] (identity of the run) and [`Progressed`] (progress of the run and its outputs). The
+//! states of the participants follow, with the further data of a restart, and then the rollback points. Each
+//! rollback point holds a [`Progressed`] and the states. A file appears under its name only once it is whole.
 
 use std::fs;
 use std::io::Write;
@@ -24,7 +24,7 @@ use crate::rollback::Point;
 
 /// The first bytes of every checkpoint.
 const MAGIC: [u8; 8] = *b"\x89PLIANT\n";
-/// The version of what follows. Any change of what is in a body needs the next number.
+/// Version of the format. Any change of the content of a body needs the next number.
 pub(crate) const FORMAT: u32 = 20;
 /// Bytes before the body: magic, format, length.
 const HEAD: usize = 20;
@@ -33,7 +33,7 @@ const CRC: usize = 4;
 /// Checkpoints kept of a run.
 const KEPT: usize = 2;
 
-/// What a run was: what has to be the same to go on with it.
+/// Identity of a run: the run that resumes it has to match.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Origin {
     /// Duration [s] of the scene, from which the step comes.
@@ -43,7 +43,7 @@ struct Origin {
     tables: Vec<(String, u64)>,
 }
 
-/// The same of a participant.
+/// Identity of a participant.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct OwnOrigin {
     name: String,
@@ -55,7 +55,7 @@ struct OwnOrigin {
     parts: Vec<(String, u64)>,
 }
 
-/// Why a run cannot be resumed.
+/// Reasons why a run cannot be resumed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ResumeError {
     /// The file can't be read.
@@ -63,7 +63,7 @@ pub enum ResumeError {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// Message of the system.
         reason: String,
     },
     /// A folder without checkpoints.
@@ -94,7 +94,7 @@ pub enum ResumeError {
         /// The file.
         path: PathBuf,
     },
-    /// Of a format that is not read here.
+    /// The checkpoint has a format that this version does not read.
     #[error("the checkpoint `{}` has format {format}; this version of pliant reads format {}", path.display(), FORMAT)]
     OtherFormat {
         /// The file.
@@ -102,7 +102,7 @@ pub enum ResumeError {
         /// Its format.
         format: u32,
     },
-    /// Of a run in another number type.
+    /// The checkpoint is of a run in another number type.
     #[error("the checkpoint is of a run in {checkpoint} precision, the scene asks for {scene}")]
     OtherPrecision {
         /// `single` or `double`.
@@ -110,7 +110,7 @@ pub enum ResumeError {
         /// `single` or `double`.
         scene: &'static str,
     },
-    /// Of a run with another solver.
+    /// The checkpoint is of a run with another solver.
     #[error("the checkpoint is of a run with the solver `{checkpoint}`, the scene asks for `{scene}`")]
     OtherSolver {
         /// Its word in a scene file.
@@ -118,7 +118,7 @@ pub enum ResumeError {
         /// Its word in a scene file.
         scene: &'static str,
     },
-    /// Of a run with another step.
+    /// The checkpoint is of a run with another step.
     #[error(
         "the checkpoint is of a run with steps of {checkpoint:e} s, this scene takes steps of {scene:e} s"
     )]
@@ -128,7 +128,7 @@ pub enum ResumeError {
         /// Step [s].
         scene: f64,
     },
-    /// Of a run of another scene.
+    /// The checkpoint is of another scene.
     #[error("the checkpoint is of another scene: {}", differing(parts))]
     OtherScene {
         /// The parts that differ, in words; empty if only their order does.
@@ -164,13 +164,13 @@ pub enum ResumeError {
     OtherOutputs {
         /// The folder, or the file in it.
         path: PathBuf,
-        /// What is wrong.
+        /// The difference.
         reason: String,
     },
 }
 
 impl ResumeError {
-    /// What to try.
+    /// Returns what the user can try.
     pub fn remedy(&self) -> String {
         match self {
             Self::Unreadable { .. } => "check the path and the permissions".into(),
@@ -267,7 +267,7 @@ impl Origin {
         }
     }
 
-    /// All that is compared, with its fingerprint.
+    /// Returns the compared parts with their fingerprints.
     fn parts(&self) -> Vec<(String, u64)> {
         let own = self.participants.iter().flat_map(|own| &own.parts);
         let names: Vec<&String> = self.participants.iter().map(|own| &own.name).collect();
@@ -329,7 +329,7 @@ impl Checkpoint {
     /// Reads a checkpoint; a folder means the last one in it.
     ///
     /// # Errors
-    /// If there is none, or the file is none, is of another format, or is not as it was written.
+    /// If the folder has no checkpoint, or the file is no checkpoint, has another format or is damaged.
     pub fn read(path: &Path) -> Result<Self, ResumeError> {
         let unreadable = |path: &Path, error: std::io::Error| ResumeError::Unreadable {
             path: path.to_owned(),
@@ -344,10 +344,10 @@ impl Checkpoint {
         Self::from_bytes(&file, &bytes)
     }
 
-    /// The checkpoint that the bytes of a file are; errors name `path`.
+    /// Decodes a checkpoint from the bytes of a file; errors name `path`.
     ///
     /// # Errors
-    /// If they are none, are of another format, or are not as they were written.
+    /// If the bytes are no checkpoint, have another format or are damaged.
     pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self, ResumeError> {
         let path = path.to_owned();
         let found = bytes.len() as u64;
@@ -395,7 +395,7 @@ impl Checkpoint {
         &self.path
     }
 
-    /// Time [s] at which the run goes on.
+    /// Returns the time [s] at which the run continues.
     pub fn time(&self) -> f64 {
         self.progressed.time
     }
@@ -405,14 +405,14 @@ impl Checkpoint {
         self.origin.participants.iter().map(|own| own.step).fold(0.0, f64::max)
     }
 
-    /// Whether a run that ends at a time [s] has no step left: only its last instant may still have to be
+    /// True if a run that ends at a time [s] has no step left: only its last instant may still have to be
     /// written.
     pub(crate) fn is_at_the_end(&self, until: f64) -> bool {
         self.time() + 0.5 * self.step() >= until
     }
 
-    /// The world that goes on from here, with the steps of the checkpoint. Only `until` may differ from that
-    /// of the interrupted run.
+    /// Returns the world that continues from here, with the steps of the checkpoint. Only `until` may differ
+    /// from the interrupted run.
     ///
     /// # Errors
     /// If this is not the world of the checkpoint, or it ends before.
@@ -491,17 +491,17 @@ impl<'a> Checkpoints<'a> {
         Some(Self { folder, origin: Origin::of(world), schedule })
     }
 
-    /// Whether one is to be written at an instant.
+    /// True if a checkpoint has to be written at an instant.
     pub fn is_due(&mut self, time: f64, step: f64, last: bool) -> bool {
         self.schedule.is_due(time, step, last)
     }
 
-    /// How many steps may go on from a time without missing one.
+    /// Number of steps that a run may take from a time without missing a checkpoint.
     pub fn stride(&self, time: f64, step: f64) -> u64 {
         self.schedule.stride(time, step)
     }
 
-    /// Removes those after some steps.
+    /// Removes checkpoints later than a number of steps.
     pub(crate) fn remove_after(&self, steps: u64) -> Result<(), OutputError> {
         let folder = self.folder.path();
         let all = checkpoints_in(folder).map_err(|error| OutputError::new(folder, error))?;
@@ -510,7 +510,7 @@ impl<'a> Checkpoints<'a> {
             .try_for_each(|(_, later)| fs::remove_file(later).map_err(|error| OutputError::new(later, error)))
     }
 
-    /// Writes one, and removes those before the last two.
+    /// Writes a checkpoint, and removes earlier checkpoints except the last two.
     pub fn write(
         &self,
         progressed: &Progressed,
@@ -640,8 +640,8 @@ mod tests {
         }
     }
 
-    /// The layout of [`State`] and [`Progressed`] decides what a checkpoint can be read with: whoever changes
-    /// it gives [`FORMAT`] the next number, and this test the new bytes.
+    /// The layout of [`State`] and [`Progressed`] decides which checkpoints can be read. Whoever changes it
+    /// gives [`FORMAT`] the next number, and this test the new bytes.
     #[test]
     fn the_layout_of_format_20_is_as_it_was() {
         let bytes = |run: &str| {

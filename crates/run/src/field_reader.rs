@@ -26,8 +26,8 @@ pub struct FieldReader {
 }
 
 impl FieldReader {
-    /// A field by its name in outputs (`von-mises`) on a body or a carried surface, at its points or its
-    /// cells; without a name on all bodies together.
+    /// Opens a field by its name in outputs (`von-mises`) on a body or a carried surface, at points or cells.
+    /// Without a body's name it covers all bodies together.
     ///
     /// # Errors
     /// If there is no such body or field, or the body doesn't have it.
@@ -54,8 +54,8 @@ impl FieldReader {
         self.mesh.fill(&frames(world, simulation));
     }
 
-    /// The values last taken, an item after the other: at points those of the mesh of the body in its order,
-    /// at cells those of its cells. `NaN` where a body has none.
+    /// Returns the values last taken, one item after the other, in the order of the points or cells of the
+    /// mesh. Values are `NaN` where a body lacks the field.
     ///
     /// # Errors
     /// If the body doesn't have the field.

@@ -1,6 +1,7 @@
-//! Runs of scenes: a [`World`](pliant_scene::World) is stepped, and its outputs, checkpoints, plot and
-//! summary go to a folder. [`run`] does one run, [`Sweep`] many with different values, [`Live`] is what a
-//! window steps at its own pace. Outputs read instants and fields of [`pliant_sim`] and never change a state.
+//! Runs of scenes: steps a [`World`](pliant_scene::World), and writes its outputs, checkpoints, plot and
+//! summary to a folder. The function [`run`] does one run, and a [`Sweep`] does many with different values. A
+//! window steps a [`Live`] at its own pace. Outputs read instants and fields of [`pliant_sim`] and never
+//! change a state.
 //!
 //! ```
 //! use pliant_run::{OutputFolder, run};

@@ -1,5 +1,5 @@
-//! A scene that is played: it goes on as long as someone looks, is pulled at, and shows what its `[view]`
-//! asks.
+//! A scene that is played: it runs as long as someone looks, can be pulled at, and shows what its `[view]`
+//! asks for.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -30,13 +30,13 @@ fn corners(extent: Extent) -> impl Iterator<Item = Vector3> {
     (0..8).map(move |corner| Vector3::from_fn(|axis, _| extent[corner >> axis & 1][axis]))
 }
 
-/// A world under way, and what is shown and sampled of it.
+/// A running world with its displayed mesh and its samples.
 pub struct Live {
     /// The simulation: it is stepped, held and read here.
     pub simulation: Simulation,
     world: Arc<World>,
     shown: FieldMesh,
-    /// What finds the points of the snapshot where the state lies on a device.
+    /// Finds the points of the snapshot of a state on a device.
     #[cfg(feature = "gpu")]
     mapping: Option<DeviceMapping>,
     samples: Samples,
@@ -51,9 +51,8 @@ impl Live {
         Ok(Self::of(world, world.simulation()?))
     }
 
-    /// Plays a world on from where a run of another one stands, with displacements, velocities and what
-    /// relaxing laws remember. `None` where this one has another mesh, solver or precision than that
-    /// `before`.
+    /// Continues the run of another world, `before`, in this world: with displacements, velocities and the
+    /// internal variables of relaxing laws. Returns `None` if the worlds differ in mesh, solver or precision.
     ///
     /// # Errors
     /// If a stepper can't be made.
@@ -75,7 +74,7 @@ impl Live {
         Ok(())
     }
 
-    /// Halves the steps from here on. Hands let go.
+    /// Halves the steps from here on, and releases all grips.
     ///
     /// # Errors
     /// If the steps can't be halved, the state can't be taken, or a stepper can't be made.
@@ -87,8 +86,8 @@ impl Live {
         self.restore(state)
     }
 
-    /// Goes on with other numbers (laws, loads, steps) from the present state. False, and nothing changes,
-    /// where the other world has other meshes, solvers or number types.
+    /// Continues from the present state with other numbers (laws, loads, steps). Returns false and changes
+    /// nothing if the other world has other meshes, solvers or number types.
     ///
     /// # Errors
     /// If the state can't be taken, or a stepper can't be made. The run then stays as it was.
@@ -113,8 +112,9 @@ impl Live {
         }
     }
 
-    /// The points shown at the instant, found on the GPU where the state lies, with a value each; `given`
-    /// takes the place of those given before. `None` where the solver keeps its state in ordinary memory.
+    /// Returns the displayed points at the instant with a value each, computed on the GPU where the state
+    /// lies. `given` replaces the earlier given values. Returns `None` if the solver keeps its state in
+    /// ordinary memory.
     #[cfg(feature = "gpu")]
     pub fn place(
         &mut self,
@@ -140,31 +140,34 @@ impl Live {
         Some(Ok(mapping.points().clone()))
     }
 
-    /// Whether the state lies on a device, so that places of nodes are known only where it was read back.
+    /// True if the state lies on a device, so that places of nodes are known only after they are read back.
     #[cfg(feature = "gpu")]
     pub fn is_on_device(&self) -> bool {
         self.world.device().is_some()
     }
 
-    /// The point of what is shown, as a combination of nodes, counted over the models of all participants.
+    /// Returns a point of the displayed mesh as a combination of nodes, counted over the models of all
+    /// participants.
     pub fn nodes_of(&self, point: u32) -> Vec<(u32, f64)> {
         let (part, nodes) = self.shown.nodes_of(&self.world, point);
         nodes.into_iter().map(|(node, weight)| (self.simulation.node(part, node), weight)).collect()
     }
 
-    /// The tool or obstacle that a point of what is shown belongs to; `None` of a point of a body.
+    /// Returns the tool or obstacle that a point of the displayed mesh belongs to; `None` for a point of a
+    /// body.
     pub fn thing_of(&self, point: u32) -> Option<&Rigid> {
         let (part, rigid) = self.shown.thing_of(point)?;
         self.world.participants[part].built.contacts.as_ref()?.rigids.get(rigid)
     }
 
-    /// Whether a point of what is shown can be taken hold of: of a body or a tool, not of an obstacle.
+    /// True if a user can grab a point of the displayed mesh: a point of a body or a tool, not of an
+    /// obstacle.
     pub fn is_movable(&self, point: u32) -> bool {
         let is_tool = |rigid: &Rigid| self.world.scene.tools.iter().any(|(name, _)| name == rigid.tool());
         self.thing_of(point).is_none_or(is_tool)
     }
 
-    /// Where a point of a tool in its place at the start [m] is now.
+    /// Returns the present place of a point of a tool that is at `start` [m] at the start.
     pub fn place_on(&self, point: u32, start: &Vector3) -> Vector3 {
         let moved = self.shown.thing_of(point).and_then(|(part, number)| {
             let rigid = self.world.participants[part].built.contacts.as_ref()?.rigids.get(number)?;
@@ -176,8 +179,8 @@ impl Live {
         moved.unwrap_or(*start)
     }
 
-    /// Where obstacles, tools and driven nodes come on their way to the end of the scene [m]: corners of the
-    /// box around each, at some instants.
+    /// Returns places [m] that obstacles, tools and driven nodes reach until the end of the scene. They are
+    /// the corners of the box around each, at some instants.
     pub fn ways(&self) -> Vec<Vector3> {
         let mut things: BTreeMap<(usize, usize), Vec<Vector3>> = BTreeMap::new();
         for (index, &point) in (0..).zip(&self.shown.mesh().points) {
@@ -225,12 +228,13 @@ impl Live {
         }
     }
 
-    /// What is shown, at rest, with the fields of the instant last shown.
+    /// Returns the displayed mesh, at rest, with the fields of the instant last shown.
     pub fn shown(&self) -> &Mesh {
         self.shown.mesh()
     }
 
-    /// What is shown, at rest, with the fields of the instant, whose forces are then found.
+    /// Returns the displayed mesh, at rest, with the fields of the present instant. Computes the forces
+    /// first.
     ///
     /// # Errors
     /// If forces at the instant can't be found.
@@ -246,7 +250,8 @@ impl Live {
         frames(&self.world, &self.simulation).iter().flat_map(Frame::reactions).collect()
     }
 
-    /// What is sampled: reactions, energies and the probes of all tables of the scene, with units.
+    /// Returns the columns of a sample: reactions, energies and the probes of all tables of the scene, with
+    /// units.
     pub fn columns(&self) -> &[Column] {
         self.samples.columns()
     }

@@ -133,7 +133,7 @@ fn write_body(page: &mut String, summary: &BodySummary, body: &BuiltBody, built:
     writeln!(page)
 }
 
-/// What a constraint does, and with how many nodes.
+/// Writes the effect of a constraint, and its number of nodes.
 fn write_constraint(page: &mut String, constraint: &Constraint) -> fmt::Result {
     let what = match constraint.motion {
         Motion::Fixed => "fixes",
@@ -168,7 +168,7 @@ fn write_outputs(page: &mut String, scene: &Scene) -> fmt::Result {
     Ok(())
 }
 
-/// What a load does at its full size.
+/// Describes the effect of a load at its full size.
 fn describe_load(built: &Built, load: &Load) -> String {
     let vector = |v: [f64; 3]| format!("({})", v.map(number).join(", "));
     match &load.kind {
@@ -196,7 +196,7 @@ fn describe_load(built: &Built, load: &Load) -> String {
     }
 }
 
-/// What the triangles of a shell are.
+/// Writes number, thickness, area and smallest altitude of the triangles of a shell.
 fn write_implicit(page: &mut String, part: &ImplicitBodies, name: &str, built: &Built) -> fmt::Result {
     let body = built.bodies.iter().position(|body| body.name == name).unwrap_or(0);
     match &part.cells[body] {
@@ -219,8 +219,8 @@ fn write_implicit(page: &mut String, part: &ImplicitBodies, name: &str, built: &
     }
 }
 
-/// What the factors of the equations take where a solver needs them, and a warning where that is more than is
-/// free.
+/// Writes the memory for the factors of the equations where a solver needs them. Warns if they need more
+/// memory than is free.
 fn write_factors(page: &mut String, scene: &Scene, built: &Built) -> fmt::Result {
     let table = scene.run.linear.table();
     let needs = match table.by {

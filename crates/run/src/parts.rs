@@ -1,5 +1,5 @@
-//! Parts of a sweep, for job arrays: each part is a process of its own and appends a line to its file when a
-//! run ends, and the parts are put together at the end.
+//! Parts of a sweep, for job arrays. Each part is a separate process and appends a line to its file when a
+//! run ends. The parts are put together at the end.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
@@ -42,18 +42,18 @@ impl SweepPart {
     }
 }
 
-/// What became of a part.
+/// The result of a part.
 #[derive(Clone, Debug)]
 pub struct PartSummary {
     /// The file of its rows.
     pub rows: PathBuf,
     /// Runs of the part.
     pub runs: usize,
-    /// Those that were there from an earlier call.
+    /// Runs whose rows were there from an earlier call.
     pub known: usize,
-    /// Those that failed: number and reason.
+    /// Runs that failed: number and reason.
     pub failures: Vec<(usize, String)>,
-    /// Whether it was stopped before its end.
+    /// True if the part was stopped before its end.
     pub interrupted: bool,
 }
 

@@ -1,4 +1,4 @@
-//! How far a run is: what checkpoints and rollback points have beside the states of participants.
+//! Progress of a run, which checkpoints and rollback points hold besides the states of participants.
 
 use pliant_mechanics::count;
 use pliant_sim::Schedule;
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::output::{History, Watched, Written};
 
-/// How far a run and its outputs were.
+/// Progress of a run and its outputs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Progressed {
     pub time: f64,
@@ -18,6 +18,6 @@ pub(crate) struct Progressed {
     /// Samples for plot and summary.
     pub history: History,
     pub sampling: Schedule,
-    /// Of each output of the scene.
+    /// Schedule and progress of each output of the scene.
     pub outputs: Vec<(Schedule, Written)>,
 }

@@ -1,9 +1,9 @@
 //! Rollback points: states of a run that are kept in memory. A run whose explicit step fails goes back to one
 //! of them and halves its steps.
 //!
-//! Two points are kept, so that the one that is taken lies at least [`EVERY`] steps before the failure: an
-//! instability has grown for a while before it is noticed. They are part of checkpoints, so a resumed run
-//! goes back to the same states.
+//! A run keeps two points, so that the chosen one lies at least [`EVERY`] steps before the failure. An
+//! instability has grown for a while before it is noticed. The points are part of checkpoints, so a resumed
+//! run goes back to the same states.
 
 use pliant_sim::{Failure, Simulation, State, World};
 
@@ -31,7 +31,8 @@ pub(crate) struct RollbackPoints {
 }
 
 impl RollbackPoints {
-    /// Of a world, with the points of the run that it resumes; `None` if no participant cuts its steps.
+    /// Makes the rollback points of a world, with the points of the run that it resumes; `None` if no
+    /// participant cuts its steps.
     pub fn new(world: &World, points: Vec<Point>) -> Option<Self> {
         let most = world.parts.iter().map(|part| part.steps.number).max()?;
         let common = world.parts.iter().map(|part| part.steps.number).min()?;
@@ -39,7 +40,7 @@ impl RollbackPoints {
         world.cuts_steps().then_some(Self { every, points })
     }
 
-    /// Whether the instant after a step becomes a point; the first instant always does.
+    /// True if the instant after a step becomes a point; the first instant always does.
     pub fn is_due(&self, simulation: &Simulation) -> bool {
         self.points.is_empty()
             || simulation.steps().is_multiple_of(self.every) && simulation.energies().balance < BALANCED
@@ -69,7 +70,7 @@ impl RollbackPoints {
         self.points.first().cloned()
     }
 
-    /// All points.
+    /// Returns the points.
     pub fn points(&self) -> &[Point] {
         &self.points
     }

@@ -1,4 +1,4 @@
-//! What a run writes and keeps while it goes: outputs, samples, checkpoints, reports of progress.
+//! One run: its outputs, samples, checkpoints and reports of progress.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -23,15 +23,15 @@ use crate::rollback::{Point, RollbackPoints};
 
 /// Draws an instant of a run.
 pub trait Draw: fmt::Debug + Sync {
-    /// A PNG file of a mesh at rest with the fields of an instant, at a time [s]; and of the constraints and
-    /// loads of another one, where these are marked.
+    /// Draws a PNG file of a mesh at rest with the fields of an instant, at a time [s]. If given, `marks` is
+    /// a mesh whose constraints and loads are marked.
     ///
     /// # Errors
-    /// Why there is no picture.
+    /// The reason why there is no picture.
     fn draw(&self, mesh: &Mesh, marks: Option<&Mesh>, time: f64) -> Result<Vec<u8>, String>;
 }
 
-/// How far a run is.
+/// Progress of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct Progress {
     /// Simulated time [s].
@@ -40,18 +40,18 @@ pub struct Progress {
     pub until: f64,
     /// Wall time so far.
     pub wall: Duration,
-    /// Where a quasi-static run is within a load step.
+    /// Progress within a load step of a quasi-static run.
     pub load_step: Option<LoadStepProgress>,
 }
 
-/// What a run can be given beside its scene.
+/// Options of a run besides its scene.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Options<'a> {
-    /// Where to go on, in a folder that was [reopened](OutputFolder::reopen) for it and with the plan by
-    /// which it [continues](Checkpoint::continues); at the start of the scene if not given.
+    /// Checkpoint to continue from; without it the run begins at the start of the scene. The folder was
+    /// [reopened](OutputFolder::reopen) for it, and its plan [continues](Checkpoint::continues) it.
     pub resume: Option<&'a Checkpoint>,
-    /// Ends the run once it is asked, with a checkpoint if the scene asks for some: after the current step,
-    /// or before it if that takes long.
+    /// Ends the run on request, with a checkpoint if the scene asks for some. The run ends after the current
+    /// step, or at the state before it if the step takes long.
     pub stop: Option<&'a StopFlag>,
     /// Draws the last instant, as the scene's `[view]` shows it, into `picture.png`.
     pub picture: Option<&'a dyn Draw>,
@@ -59,7 +59,7 @@ pub struct Options<'a> {
 
 /// Samples in the history.
 const SAMPLES: f64 = 1000.0;
-/// Those of a run on a GPU, which has to stop for each.
+/// Samples of a run on a GPU, which has to stop for each.
 const SAMPLES_ON_DEVICE: f64 = 250.0;
 
 /// Samples from one look at the fields of all cells of solids to the next: a look costs as much as a few
@@ -70,7 +70,7 @@ const SAMPLES_A_LOOK: usize = 50;
 const REPORT: Duration = Duration::from_millis(100);
 
 /// Runs a world and writes its outputs, `plot.svg` and `summary.md`. A failure of the run, or of writing
-/// while it runs, is in the summary; whatever was written before stays.
+/// while it runs, is in the summary; earlier output stays.
 ///
 /// # Errors
 /// If the outputs can't be opened.
@@ -82,7 +82,7 @@ pub fn run(
     run_with(world, folder, Options::default(), report)
 }
 
-/// As [`run`], from a checkpoint or with a way to stop it.
+/// Runs like [`run`], from a checkpoint or with a way to stop it.
 ///
 /// # Errors
 /// If the outputs can't be opened.
@@ -167,12 +167,12 @@ fn check_of(part: &Part) -> Option<IntersectionCheck> {
     Some(IntersectionCheck::new(contacts, &part.built.model.rest))
 }
 
-/// Whether states lie on a GPU.
+/// True if states lie on a GPU.
 fn is_on_device(world: &World) -> bool {
     world.participants.iter().any(|part| part.plan.target.is_gpu())
 }
 
-/// What is seen, written and kept of a run.
+/// Observations, outputs and kept states of a run.
 struct Run<'a, 'env> {
     world: &'a World,
     outputs: Outputs<'a>,
@@ -183,15 +183,15 @@ struct Run<'a, 'env> {
     /// The search for intersections of each, where one is asked for.
     checks: Vec<Option<IntersectionCheck>>,
     checkpoints: Option<Checkpoints<'a>>,
-    /// Where it goes back to after a step that failed.
+    /// States to go back to after a step that failed.
     rollback: Option<RollbackPoints>,
     folder: &'a OutputFolder,
-    /// Where outputs on a thread of their own get it.
+    /// Scope for outputs on a thread of their own.
     spare: Option<&'a Scope<'a, 'env>>,
     /// Ends the run once it is asked.
     stop: Option<&'a StopFlag>,
     report: &'a mut (dyn FnMut(Progress) + Send),
-    /// When progress was last reported.
+    /// Time of the last report of progress.
     reported: Instant,
     started: Instant,
     /// Wall time [s] of the run that this one resumes.
@@ -246,7 +246,7 @@ impl<'a, 'env> Run<'a, 'env> {
         })
     }
 
-    /// All steps, and what is known at their end.
+    /// Takes all steps, and returns the outcome.
     fn take_all(
         mut self,
         mut simulation: Simulation,
@@ -254,7 +254,7 @@ impl<'a, 'env> Run<'a, 'env> {
         options: Options<'_>,
     ) -> Outcome {
         let failure = self.go(&mut simulation).err();
-        // What the run has failed at counts before what its outputs have.
+        // A failure of the run takes precedence over a failure of its outputs.
         let failure = failure.or(self.outputs.end().err());
         let failure = failure.map(|failure| self.advised(failure, &simulation));
         let picture = options.picture.filter(|_| failure.is_none());
@@ -324,7 +324,7 @@ impl<'a, 'env> Run<'a, 'env> {
         Ok(())
     }
 
-    /// How far the run is.
+    /// Returns the progress of the run.
     fn progressed(&mut self, simulation: &Simulation) -> Result<Progressed, Failure> {
         Ok(Progressed {
             time: simulation.time(),
@@ -338,7 +338,7 @@ impl<'a, 'env> Run<'a, 'env> {
     }
 
     fn keep_point(&mut self, simulation: &mut Simulation) -> Result<(), Failure> {
-        // The wall time goes on.
+        // A rollback does not turn back the wall time.
         let progressed = Progressed { wall_seconds: 0.0, ..self.progressed(simulation)? };
         let point = Point { progressed, state: simulation.state()? };
         if let Some(points) = &mut self.rollback {
@@ -462,7 +462,7 @@ impl Observer for Run<'_, '_> {
         if due {
             self.write_checkpoint(simulation)?;
         }
-        // What is left of the last instant is quickly done.
+        // The rest of the last instant is quickly done.
         if stop && !last {
             let kept = due.then_some(self.kept.as_deref()).flatten();
             return Err(interrupted(time, kept));
@@ -470,7 +470,7 @@ impl Observer for Run<'_, '_> {
         Ok(())
     }
 
-    /// Shows what was found until then to those who have not looked at it.
+    /// Shows the results until the failure to outputs that have not seen them.
     fn step_failed(&mut self, simulation: &mut Simulation) {
         let seen = simulation.time();
         if !simulation.keeps_what_it_found() {

@@ -8,18 +8,18 @@ use pliant_sim::{Instant, Simulation};
 
 use crate::output::{Frame, carried_on_shell};
 
-/// A surface of a world. It reads displacements as they stand: those of a state on a GPU are known where an
-/// instant is [looked at](Simulation::frame).
+/// A surface of a world. It reads the displacements that are at hand: displacements of a state on a GPU are
+/// known after an instant is [looked at](Simulation::frame).
 pub struct Skin {
     /// The participant, by number.
     part: usize,
-    /// Where vertices are at rest [m].
+    /// Places of vertices at rest [m].
     rest: Vec<[f64; 3]>,
     triangles: Vec<[u32; 3]>,
     follows: Follows,
 }
 
-/// What vertices follow.
+/// Nodes or body that the vertices follow.
 enum Follows {
     /// The node of the participant's model of each vertex.
     Nodes(Vec<u32>),
@@ -28,8 +28,8 @@ enum Follows {
 }
 
 impl Skin {
-    /// The boundary of a body, or a carried surface, by name; without a name that of the only body. `None`
-    /// where there is none, or none alone.
+    /// Finds the boundary of a body, or a carried surface, by name; without a name the boundary of the only
+    /// body. Returns `None` if there is no such surface, or without a name if there are several bodies.
     pub fn new(world: &World, on: Option<&str>) -> Option<Self> {
         for (index, part) in world.participants.iter().enumerate() {
             let built = &part.built;
@@ -57,7 +57,7 @@ impl Skin {
         &self.triangles
     }
 
-    /// Where the vertices are at rest [m].
+    /// Returns the places of the vertices at rest [m].
     pub fn rest(&self) -> &[[f64; 3]] {
         &self.rest
     }
@@ -74,8 +74,8 @@ impl Skin {
         }
     }
 
-    /// The surface around a vertex within a radius [m], as a hand takes hold of it ([`patch`]), as a
-    /// combination of nodes; with a radius of 0 the vertex alone.
+    /// Returns the surface around a vertex within a radius [m] as a combination of nodes, like the grip of a
+    /// hand ([`patch`]). With a radius of 0 it is the vertex alone.
     pub fn around(&self, simulation: &Simulation, vertex: u32, radius: f64) -> Vec<(u32, f64)> {
         let points: Vec<Vector3> = self.rest.iter().map(|&place| place.into()).collect();
         let at = |triangle: &&[u32; 3]| triangle.contains(&vertex);
@@ -140,8 +140,8 @@ impl Skin {
         }
     }
 
-    /// Unit normals of vertices at these places [m]: the mean of those of the triangles around each, by area;
-    /// zero where these cancel.
+    /// Computes unit normals of vertices at these places [m]: the mean of the normals of the triangles around
+    /// each, by area. Where these cancel the normal is zero.
     pub fn normals(&self, places: &[[f64; 3]], normals: &mut [[f64; 3]]) {
         normals.fill([0.0; 3]);
         for triangle in &self.triangles {
@@ -160,8 +160,8 @@ impl Skin {
     }
 }
 
-/// Points of a mesh as vertices, the triangles of a surface on them, and the point of each vertex: all
-/// points, or only those of the surface.
+/// Takes points of a mesh as vertices: all points, or only the points of the surface. Returns them, the
+/// triangles of the surface on them, and the point of each vertex.
 fn used(mesh: &Mesh, surface: &Surface, only: bool) -> (Vec<[f64; 3]>, Vec<[u32; 3]>, Vec<u32>) {
     let mut triangles = surface.triangles();
     let vertices = if only { surface.nodes() } else { (0..mesh.points.len() as u32).collect() };

@@ -1,7 +1,7 @@
 //! Snapshots as bytes, for files and other processes.
 //!
-//! [`MAGIC`], the [`FORMAT`] of states (u32), a fingerprint of the model (u64), the length of the body (u64),
-//! the body, and the CRC-32 of all before it (u32); little-endian.
+//! They hold [`MAGIC`], the [`FORMAT`] of states (u32), a fingerprint of the model (u64) and the length of
+//! the body (u64). Then come the body and the CRC-32 of all bytes before it (u32). Numbers are little-endian.
 
 use pliant_mechanics::fingerprint;
 use pliant_sim::{Failure, FailureKind, State, World};

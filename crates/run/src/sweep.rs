@@ -47,23 +47,23 @@ struct Axis {
     values: Vec<String>,
 }
 
-/// How a sweep is run.
+/// Options of a sweep.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SweepOptions<'a> {
     /// Runs at a time; 0: one per core. The number never changes a result.
     pub threads: usize,
-    /// Whether the series of fields are written, too.
+    /// True if the series of fields are written, too.
     pub keep_fields: bool,
     /// Ends the sweep once it is asked.
     pub stop: Option<&'a StopFlag>,
 }
 
-/// How far a sweep is.
+/// Progress of a sweep.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SweepProgress {
     /// Runs that have ended.
     pub ended: usize,
-    /// Those of them that failed.
+    /// Runs that have failed.
     pub failed: usize,
     /// Part of all simulated time that is done.
     pub part: f64,
@@ -80,7 +80,7 @@ pub struct SweepSummary {
     pub failures: Vec<(usize, String)>,
     /// Runs.
     pub runs: usize,
-    /// Whether it was stopped before its end.
+    /// True if the sweep was stopped before its end.
     pub interrupted: bool,
 }
 
@@ -100,11 +100,12 @@ pub(crate) struct Row {
 }
 
 impl Sweep {
-    /// From a scene's text and assignments `KEY=VALUES`, where VALUES are separated by commas outside of
-    /// brackets and quotes, and `FROM..TO/N` stands for N numbers from FROM to TO in equal steps.
+    /// Makes a sweep from a scene's text and assignments `KEY=VALUES`. VALUES are separated by commas outside
+    /// of brackets and quotes. `FROM..TO/N` stands for N numbers from FROM to TO in equal steps.
     ///
     /// # Errors
-    /// If an assignment is none, a key has no value or stands twice, or there are too many combinations.
+    /// If an assignment has another form, a key has no value or stands twice, or there are too many
+    /// combinations.
     pub fn new(source: Source, folder: PathBuf, sets: &[String]) -> Result<Self, SceneErrors> {
         let (mut axes, mut mistakes) = (Vec::<Axis>::new(), Vec::new());
         for set in sets {
@@ -132,7 +133,7 @@ impl Sweep {
         }
     }
 
-    /// The same with the meshes of images that are kept.
+    /// Sets the cache for meshes of images.
     pub fn with_cache(self, cache: MeshCache) -> Self {
         Self { cache, ..self }
     }
@@ -192,8 +193,8 @@ impl Sweep {
         mistakes
     }
 
-    /// Opens the folder of a sweep as [`OutputFolder::prepare`] does that of a run; with `force` what the
-    /// runs of an earlier sweep left in their own folders is removed, too.
+    /// Opens the folder of a sweep like [`OutputFolder::prepare`]. With `force` it also removes what the runs
+    /// of an earlier sweep left in their folders.
     ///
     /// # Errors
     /// If the first combination is no scene, or the folder holds something or can't be written to.
@@ -265,7 +266,7 @@ impl Sweep {
         })
     }
 
-    /// Does one run in a folder of its own within a folder.
+    /// Does one run in a folder of its own, below a folder.
     pub(crate) fn run_one(
         &self,
         run: usize,
@@ -313,7 +314,7 @@ impl Sweep {
         self.axes.iter().map(|axis| axis.key.as_str())
     }
 
-    /// What a row belongs to: the scene, the values of its run, this version.
+    /// Key of a row: a fingerprint of the scene, the values of its run and this version.
     pub(crate) fn key(&self, run: usize) -> String {
         let scene =
             (self.source.text(), self.source.assignments(), self.title(run), env!("CARGO_PKG_VERSION"));
@@ -379,7 +380,7 @@ impl Row {
         }
     }
 
-    /// Of a run that did not start.
+    /// Makes the result of a run that did not start.
     fn failed(reason: impl ToString) -> Self {
         Self {
             status: "failed".to_owned(),

@@ -1,10 +1,10 @@
 //! Cache of meshes made from images and surfaces, and of distances to surfaces. The name of a file is a hash
-//! of all inputs: the content of the image, all parameters and the source text of the mesher, so no mesh is
-//! stale. A file appears under its name only once it is complete. A file that is damaged, or holds a mesh
-//! that no mesher makes, counts as missing, so any number of processes can share a folder. Files unused for
-//! longest are deleted.
+//! of the content of the image, all parameters and the source text of the mesher. So no mesh is stale. A file
+//! appears under its name only once it is complete. A file that is damaged, or holds a mesh that no mesher
+//! makes, counts as missing, so any number of processes can share a folder. Files unused for longest are
+//! deleted.
 //!
-//! The file: [`MESH`] or [`GRID`], the CRC-32 of the body (u32, little-endian), the body in postcard's
+//! A file holds [`MESH`] or [`GRID`], the CRC-32 of the body (u32, little-endian), and the body in postcard's
 //! encoding.
 
 use std::collections::BTreeMap;
@@ -29,7 +29,7 @@ const DEFAULT_LIMIT: u64 = 1 << 30;
 /// Names the folder, or says `off`.
 const VARIABLE: &str = "PLIANT_CACHE";
 
-/// Where meshes of images are kept.
+/// Cache for meshes of images.
 #[derive(Clone, Debug, Default)]
 pub struct MeshCache {
     folder: Option<PathBuf>,
@@ -55,7 +55,7 @@ struct Body {
     doubts: Vec<String>,
 }
 
-/// Distances to a surface on a grid as they were made, with what is told about them.
+/// Distances to a surface on a grid as they were made, with their remarks.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct KeptGrid {
     pub origin: [f64; 3],
@@ -69,7 +69,7 @@ pub(crate) struct KeptGrid {
 }
 
 impl KeptGrid {
-    /// Whether it is whole, and all of its numbers are.
+    /// True if the grid is complete, and its numbers are valid.
     fn is_sound(&self) -> bool {
         let points = self.counts.iter().try_fold(1_usize, |points, &n| points.checked_mul(n as usize));
         let finite = |place: &[f64; 3]| place.iter().all(|x| x.is_finite());
@@ -86,8 +86,8 @@ impl KeptGrid {
 /// rule.
 const FLATTEST: f64 = 0.05;
 
-/// Whether a mesh is whole, and none of its volume cells is inverted or nearly flat: a checksum says only
-/// that it is what somebody wrote.
+/// True if a mesh is complete, and no volume cell is inverted or nearly flat. A checksum only proves that the
+/// bytes are as someone wrote them.
 fn is_sound(mesh: &Mesh) -> bool {
     let fits = |data: &BTreeMap<String, DataArray>, items: usize| {
         data.values().all(|data| data.values.len().checked_div(data.components) == Some(items))
@@ -107,13 +107,13 @@ fn is_sound(mesh: &Mesh) -> bool {
         && mesh.blocks.iter().all(sound)
 }
 
-/// What a mesh is made of, as a number.
+/// Hash of the inputs of a mesh.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Key(String);
 
 impl Key {
-    /// Of the content of an image or a surface, given in pieces, and a recipe that says in full what is made
-    /// of it.
+    /// Makes the key from the content of an image or a surface, given in pieces, and a recipe with all
+    /// parameters of the mesh.
     pub fn new(content: impl FnOnce(&mut dyn FnMut(&[u8])), recipe: &impl std::fmt::Debug) -> Self {
         let mut hash = Sha256::new();
         hash.update(env!("PLIANT_MESHER"));
@@ -126,7 +126,7 @@ impl Key {
     }
 }
 
-/// The folder for what is kept from run to run, and whether the user named it; `None` where nothing is to be
+/// Folder for files that stay from run to run, and true if the user named it; `None` if nothing is to be
 /// kept.
 fn folder_of_user() -> Option<(PathBuf, bool)> {
     match std::env::var_os(VARIABLE).filter(|value| !value.is_empty()) {
@@ -139,7 +139,7 @@ fn folder_of_user() -> Option<(PathBuf, bool)> {
     }
 }
 
-/// The folder for what is kept from run to run beside meshes; `None` where nothing is to be kept.
+/// Folder for other files that stay from run to run, next to the meshes; `None` if nothing is to be kept.
 pub fn cache_folder() -> Option<PathBuf> {
     Some(folder_of_user()?.0)
 }
@@ -150,7 +150,7 @@ impl MeshCache {
         Self::default()
     }
 
-    /// A folder of its own, of a gigabyte at most; made when it is needed.
+    /// Makes a cache in a folder, of a gigabyte at most; the folder is made when it is needed.
     pub fn in_folder(folder: PathBuf) -> Self {
         Self { folder: Some(folder), limit: DEFAULT_LIMIT }
     }
@@ -165,17 +165,17 @@ impl MeshCache {
         }
     }
 
-    /// The same folder for another number of bytes.
+    /// Sets the largest number of bytes.
     pub fn limited(self, limit: u64) -> Self {
         Self { limit, ..self }
     }
 
-    /// Whether anything is kept.
+    /// True if the cache keeps files.
     pub(crate) fn is_on(&self) -> bool {
         self.folder.is_some()
     }
 
-    /// What was kept under a key, where it is whole.
+    /// Returns the mesh under a key, if it is valid.
     pub(crate) fn get(&self, key: &Key) -> Option<Kept> {
         let Body { points, blocks, point_data, notes, doubts } = self.read(key, MESH)?;
         let points = points.into_iter().map(Vector3::from).collect();
@@ -183,7 +183,7 @@ impl MeshCache {
         is_sound(&mesh).then_some(Kept { mesh, notes, doubts })
     }
 
-    /// Keeps a mesh under its key, and drops what was used longest ago where there is more than the limit.
+    /// Stores a mesh under its key, and deletes the files unused for longest above the limit.
     pub(crate) fn put(&self, key: &Key, kept: &Kept) -> io::Result<()> {
         let Kept { mesh, notes, doubts } = kept.clone();
         let points = mesh.points.into_iter().map(Into::into).collect();
@@ -231,7 +231,7 @@ impl MeshCache {
         Some(self.folder.as_ref()?.join(&key.0).with_extension(kind.1))
     }
 
-    /// Drops the files used longest ago but one, until all take no more than the limit.
+    /// Deletes the files unused for longest except the newest, until all files fit the limit.
     fn drop_oldest(&self, folder: &Path, newest: &Path) -> io::Result<()> {
         let endings = [MESH.1, GRID.1, PART];
         let own =

@@ -15,10 +15,10 @@ use pliant_sim::contact::touch::{Contact, Touch, With};
 use crate::assemble::{Meet, overlaps, told_distance, told_overlap, usual_distance};
 use crate::world::World;
 
-/// How bodies of two participants can touch.
+/// Help text: bodies of two participants that can touch.
 const HOW: &str = "a solid with `explicit` steps on the CPU and bodies with `implicit` ones touch each other; or put both bodies into one participant";
 
-/// Why bodies of two participants cannot touch.
+/// Reason why bodies of two participants cannot touch.
 struct Mistake {
     message: String,
     label: &'static str,
@@ -112,7 +112,7 @@ impl World {
         Ok(Contact { name: name.into(), surface: own.surface.clone(), with: With::Body(surface), touch })
     }
 
-    /// Whether the solvers, bodies and ties of two participants let them touch.
+    /// Checks that the solvers, bodies and ties of two participants let them touch.
     fn can_meet(&self, table: &ContactTable, sides: [(usize, &Meet); 2]) -> Result<(), Mistake> {
         let solvers = sides.map(|(part, _)| self.participants[part].scene.run.solver);
         if solvers != [SolverName::Explicit, SolverName::Implicit] {
@@ -181,8 +181,7 @@ impl World {
         contacts.contacts.push(contact);
     }
 
-    /// Whether the second body is a sheet whose side towards the first one is that which its normals point
-    /// away from.
+    /// True if the second body is a sheet whose normals point away from the first one.
     fn is_behind(&self, sides: [(usize, &Meet); 2]) -> bool {
         let [(host, own), (of, other)] = sides;
         let sheet = &self.participants[of].built.bodies[other.body];
@@ -201,8 +200,8 @@ impl World {
         ways.min_by(|a, b| a.0.total_cmp(&b.0)).is_some_and(|(_, along)| along < 0.0)
     }
 
-    /// A surface of the second participant with its nodes numbered after those of the first, and the places
-    /// [m] of all at rest.
+    /// Returns a surface of the second participant with its nodes numbered after the nodes of the first. Also
+    /// returns the places [m] of all nodes at rest.
     fn side_by_side(
         &self,
         sides: [(usize, &Meet); 2],
@@ -217,7 +216,7 @@ impl World {
         (surface.numbered(|node| first + node), place)
     }
 
-    /// How the surfaces of two participants overlap at the start, in words; `None` where they do not.
+    /// Describes the overlap of the surfaces of two participants at the start; `None` without one.
     fn overlap(&self, sides: [(usize, &Meet); 2], surface: &Surface) -> Option<String> {
         let bodies = sides.map(|(part, meet)| &self.participants[part].built.bodies[meet.body]);
         let (other, place) = self.side_by_side(sides, surface);

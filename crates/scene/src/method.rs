@@ -1,4 +1,4 @@
-//! How a participant is stepped, from the tables of its scene.
+//! Stepping method of a participant, from the tables of its scene.
 
 use std::sync::Arc;
 
@@ -21,7 +21,7 @@ const IN_CONTACT: usize = 300;
 /// Iterations from which on a lagged factorisation is made anew.
 const RENEW_AFTER: usize = 10;
 
-/// How the bodies of a participant are stepped.
+/// Returns the stepping method of the bodies of a participant.
 pub(crate) fn method(built: &Built, run: &RunTable, plan: &Plan) -> Method {
     let precision = plan.target.precision;
     match &built.implicit {
@@ -54,7 +54,7 @@ fn on_unstable(name: OnUnstableName) -> OnUnstable {
     }
 }
 
-/// How shells, and solids whose equations are solved, are stepped.
+/// Returns the stepping method of shells, and of solids whose equations are solved.
 fn method_of(bodies: &Arc<ImplicitBodies>, run: &RunTable, plan: &Plan) -> Method {
     let bodies = Arc::clone(bodies);
     let table = run.linear.table();

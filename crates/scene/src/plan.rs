@@ -1,5 +1,5 @@
-//! The time step of a run: from the mesh and the laws, or as requested and then compared with the critical
-//! time step of the assembled model.
+//! The time step of a run. It comes from the mesh and the laws, or is requested and then compared with the
+//! critical time step of the assembled model.
 
 use pliant_explicit::critical_step::ElementBound;
 use pliant_format::Scene;
@@ -23,7 +23,7 @@ pub(crate) const IMPLICIT_STEP: f64 = 0.01;
 pub struct Plan {
     /// Its steps; a whole number of them makes the duration.
     pub steps: Steps,
-    /// What limits explicit steps of solids; `None` of shells, and of solids whose equations are solved.
+    /// Limits of explicit steps of solids; `None` for shells, and for solids whose equations are solved.
     pub limits: Option<Limits>,
     /// A remark about a requested step.
     pub note: Option<String>,
@@ -31,7 +31,7 @@ pub struct Plan {
     pub target: Target,
 }
 
-/// What limits explicit steps.
+/// Limits of explicit steps.
 #[derive(Clone, Debug)]
 pub struct Limits {
     /// The critical time step, and the element bound below it.
@@ -122,7 +122,7 @@ fn check_explicit_step(scene: &Scene, part: &ImplicitBodies) -> Result<Option<St
     Err(Box::new(Diagnostic::error(message).at(place, "too large").help(help)))
 }
 
-/// What limits the steps of solids, and a remark about a requested step.
+/// Returns the limits of the steps of solids, and a remark about a requested step.
 fn limits(scene: &Scene, built: &Built) -> Result<(Limits, Option<String>), Box<Diagnostic>> {
     let fail = |diagnostic| Err(Box::new(diagnostic));
     let critical = match Critical::of(&built.model) {

@@ -7,7 +7,7 @@ use pliant_geometry::{Mesh, io};
 use pliant_geometry::{Vector3, boundary};
 use pliant_meshing::{Block, DEFAULT_CELL_LIMIT, Resolution, VolumeCell};
 
-/// A bar along y, in a unit of so many metres.
+/// A bar along y, in a unit of `unit` metres.
 fn bar(unit: f64) -> Mesh {
     let block = Block::new([0.05, 0.12, 0.04]);
     let mut mesh = block.mesh(Resolution::Edge(0.02), VolumeCell::Tet, DEFAULT_CELL_LIMIT).unwrap();

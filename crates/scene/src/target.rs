@@ -22,7 +22,7 @@ pub struct Target {
     pub device: Option<Device>,
     /// The number type.
     pub precision: Precision,
-    /// Why the run uses another device than one might expect.
+    /// Reason why the run uses another device than one might expect.
     pub note: Option<String>,
 }
 
@@ -30,7 +30,7 @@ impl Target {
     /// The target that the scene requests; opens the device.
     ///
     /// # Errors
-    /// If a GPU is requested, and there is none or it can't run the scene.
+    /// If a GPU is requested, and the machine has no GPU or its GPU can't run the scene.
     pub(crate) fn choose(scene: &Scene, built: &Built) -> Result<Self, Box<Diagnostic>> {
         let run = &scene.run;
         let only = processor_only(scene, built);
@@ -134,7 +134,7 @@ impl Target {
         }
     }
 
-    /// Whether it is a GPU.
+    /// True for a GPU.
     pub fn is_gpu(&self) -> bool {
         #[cfg(feature = "gpu")]
         return self.device.is_some();
@@ -185,7 +185,7 @@ fn key_of_gpu(run: &RunTable) -> Option<&'static str> {
     None
 }
 
-/// Whether the design that the scene asks for, if it does, has what the scene needs.
+/// Checks that the design that the scene asks for supports the scene.
 #[cfg(feature = "gpu")]
 fn with_design(scene: &Scene, built: &Built) -> Result<(), Box<Diagnostic>> {
     let place = scene.source.span(&scene.run_at("design"));
@@ -203,7 +203,7 @@ fn with_design(scene: &Scene, built: &Built) -> Result<(), Box<Diagnostic>> {
     Err(Box::new(Diagnostic::error(error.to_string()).at(place, "").help(error.remedy())))
 }
 
-/// What of its contacts a GPU can't support, in words.
+/// Returns a feature of the contacts that a GPU can't support, in words.
 fn contact_only(built: &Built) -> Option<String> {
     if !built.meets.is_empty() {
         return Some("contact between participants".into());
@@ -254,7 +254,7 @@ fn processor_only(scene: &Scene, built: &Built) -> Option<(&'static str, String,
     None
 }
 
-/// The same of explicit shells.
+/// Returns the key of explicit shells that a GPU can't support, in words, and a remedy.
 fn shells_only(run: &RunTable, built: &Built) -> Option<(&'static str, String, &'static str)> {
     let help = "set `device = \"cpu\"`, or leave it out";
     if !built.meets.is_empty() {
@@ -274,8 +274,8 @@ fn shells_only(run: &RunTable, built: &Built) -> Option<(&'static str, String, &
     None
 }
 
-/// The same of shells, and of solids whose equations are solved: a GPU solves those of implicit steps by
-/// conjugate gradients.
+/// Returns the key of shells, or of solids whose equations are solved, that a GPU can't support. A GPU solves
+/// the equations of implicit steps by conjugate gradients.
 fn equations_only(run: &RunTable) -> Option<(&'static str, String, &'static str)> {
     let help = "set `device = \"cpu\"`, or `solver = \"implicit\"` with `linear = \"conjugate-gradients\"`";
     match run.solver {

@@ -22,8 +22,8 @@ pub(crate) fn read(text: &str) -> Scene {
     Scene::from_source(source, ".".into()).unwrap_or_else(|error| panic!("{}", error.plain()))
 }
 
-/// A scene in a folder with a bar of three hexes along x, with the labels 1 (liver), 2 (tumour) and 5: what
-/// is given goes on after its `mesh`. There are the laws `tissue` and `hard`.
+/// A scene in a folder with a bar of three hexes along x, with the labels 1 (liver), 2 (tumour) and 5. The
+/// text `more` follows its `mesh`. The laws are `tissue` and `hard`.
 pub(crate) fn labelled(folder: &Path, more: &str) -> Scene {
     let block = Block::new([0.3, 0.1, 0.1]);
     let mut mesh = block.mesh(Resolution::Counts([3, 1, 1]), VolumeCell::Hex, 100).unwrap();
@@ -37,22 +37,22 @@ pub(crate) fn labelled(folder: &Path, more: &str) -> Scene {
     Scene::from_source(source, folder.to_owned()).unwrap_or_else(|error| panic!("{}", error.plain()))
 }
 
-/// What is built from [`CUBE`] with more tables.
+/// Builds [`CUBE`] with more tables.
 pub(crate) fn built(more: &str) -> Built {
     build(&scene(more)).unwrap_or_else(|error| panic!("{}", error.plain()))
 }
 
-/// What is wrong with [`CUBE`] and more tables.
+/// Returns the mistakes in [`CUBE`] with more tables.
 pub(crate) fn mistakes(more: &str) -> SceneErrors {
     build(&scene(more)).expect_err("a mistake")
 }
 
-/// What is built from a text alone.
+/// Builds a text alone.
 pub(crate) fn built_alone(text: &str) -> Built {
     build(&read(text)).unwrap_or_else(|error| panic!("{}", error.plain()))
 }
 
-/// What is wrong with a text alone, found when it is read or when it is built.
+/// Returns the mistakes in a text alone, found on reading or on building.
 pub(crate) fn mistakes_alone(text: &str) -> SceneErrors {
     let source = Source::parse("alone.toml", text).unwrap_or_else(|error| panic!("{}", error.plain()));
     match Scene::from_source(source, ".".into()) {

@@ -1,4 +1,4 @@
-//! What of a scene is shown, as its table `[view]` asks.
+//! The part of a scene that its table `[view]` shows.
 
 use std::collections::BTreeMap;
 
@@ -31,7 +31,7 @@ impl Built {
         forces
     }
 
-    /// Whether a body of a name, or any one, touches something.
+    /// True if a body of a name, or any body, touches something.
     pub fn touches(&self, on: Option<&str>) -> bool {
         let Some(contacts) = &self.contacts else { return false };
         let mut bodies = self.model.bodies.iter();
@@ -60,8 +60,8 @@ impl World {
         labels
     }
 
-    /// The names of bodies, then of obstacles and tools, by their number in what is shown on a body by name,
-    /// or of all of them; that of a surface on a surface.
+    /// Returns names by number in the view of a body by name, or of all bodies: the bodies, then obstacles
+    /// and tools. For a surface returns the surface's name.
     pub fn body_names(&self, on: Option<&str>) -> BTreeMap<i32, String> {
         if let Some(surface) = on.filter(|on| self.scene.surfaces.iter().any(|(name, _)| name == on)) {
             return [(0, surface.to_owned())].into();
@@ -84,12 +84,12 @@ impl World {
         if view.hide.is_empty() { Vec::new() } else { view.hidden(&self.region_names(view.on.as_deref())) }
     }
 
-    /// Whether a body of a name, or any one, touches something.
+    /// True if a body of a name, or any body, touches something.
     pub fn touches(&self, on: Option<&str>) -> bool {
         self.participants.iter().any(|part| part.built.touches(on))
     }
 
-    /// Finds what the view names and nothing has, and a view that leaves nothing.
+    /// Reports names in the view that nothing has, and a view that shows nothing.
     pub(crate) fn check_view(&self, found: &mut Vec<Diagnostic>) {
         let view = &self.scene.view;
         let names = self.region_names(view.on.as_deref());
@@ -126,7 +126,7 @@ impl World {
     }
 }
 
-/// What can be named in a view.
+/// Help text: names and numbers that a view accepts.
 const NAMED: &str =
     "labels of elements by number, name or range, and bodies, obstacles and tools by name can be given";
 

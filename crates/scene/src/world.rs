@@ -99,7 +99,7 @@ impl World {
         Ok(world)
     }
 
-    /// Refuses unequal load steps of a participant beside others.
+    /// Refuses unequal load steps in a scene with several participants.
     fn check_load_steps(&self) -> Result<(), SceneErrors> {
         let Some(part) = self.participants.iter().find(|part| part.plan.steps.ends.is_some()) else {
             return Ok(());
@@ -111,7 +111,7 @@ impl World {
         Err(self.scene.source.errors(vec![diagnostic]))
     }
 
-    /// Of a scene whose bodies all go together.
+    /// Makes the world of a scene with one participant.
     pub fn of(scene: &Scene, built: &Arc<Built>, plan: &Plan) -> Self {
         let part =
             Part { name: String::new(), scene: scene.clone(), built: Arc::clone(built), plan: plan.clone() };
@@ -123,7 +123,7 @@ impl World {
         }
     }
 
-    /// The same of another duration [s].
+    /// Returns this world with another duration [s].
     pub fn lasting(&self, until: f64) -> Self {
         let mut world = self.clone();
         world.scene.scene.until = until;
@@ -134,7 +134,7 @@ impl World {
         world
     }
 
-    /// Makes the steps of each participant a multiple of those of the participant with the fewest.
+    /// Makes the steps of each participant a multiple of the steps of the participant with the fewest.
     fn meet(&mut self) {
         self.shorten_tied();
         let (until, common) = (self.scene.scene.until, self.steps());
@@ -171,7 +171,7 @@ impl World {
         self.slowest().plan.steps.step
     }
 
-    /// A simulation of it, at its start.
+    /// Makes a simulation of this world, at its start.
     ///
     /// # Errors
     /// If a stepper can't be made.
@@ -219,7 +219,7 @@ impl World {
         part.plan.target.device.as_ref()
     }
 
-    /// Goes on on a device that is open, where that is the one it asks for.
+    /// Uses an open device, if it is the one that the participant asks for.
     pub fn share(&mut self, open: Option<&Device>) {
         for part in &mut self.participants {
             if let (Some(open), Some(asked)) = (open, &mut part.plan.target.device)
@@ -233,7 +233,7 @@ impl World {
 }
 
 impl Part {
-    /// The same without its tables.
+    /// Returns the participant without its tables.
     fn simulated(&self) -> pliant_sim::Part {
         let Self { name, scene, built, plan } = self;
         pliant_sim::Part {
@@ -244,7 +244,7 @@ impl Part {
         }
     }
 
-    /// Whether it has the body or the surface of a name, or all are meant.
+    /// True if the participant has the body or the surface of a name, or if no name is given.
     pub fn shows(&self, on: Option<&str>) -> bool {
         on.is_none_or(|on| self.scene.has(on))
     }
@@ -258,7 +258,7 @@ impl Part {
         fields.iter().copied().filter(has).collect()
     }
 
-    /// What it is called in messages and columns.
+    /// Name of the participant in messages and columns.
     pub fn prefix(&self) -> Option<&str> {
         (!self.name.is_empty()).then_some(self.name.as_str())
     }

@@ -1,4 +1,4 @@
-//! Shells, and solids whose equations are solved, beside the model of all solvers.
+//! Shells, and solids whose equations are solved, in addition to the model of all solvers.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ pub struct ImplicitBodies {
     pub model: Arc<Assembly>,
     /// The cells of each body, in the order of the bodies.
     pub cells: Vec<BodyCells>,
-    /// What a static run prescribes instead of the size of a load.
+    /// Quantity that a static run prescribes instead of the size of a load.
     pub control: Option<RunControl>,
     /// The state that a run starts from.
     pub start: State,
@@ -42,11 +42,11 @@ pub enum RunControl {
         /// The distance [m].
         by: f64,
     },
-    /// All translations together move by a length [m] in each load step.
+    /// Length [m] by which all translations together move in each load step.
     ArcLength {
         /// The length [m].
         length: f64,
-        /// Where the path ends.
+        /// Condition that ends the path.
         stop: Stop,
     },
     /// The pressurised facets enclose a volume [m³] in the end, and another at the start.
@@ -58,7 +58,7 @@ pub enum RunControl {
     },
 }
 
-/// Where a path by arc length ends: at the first state that meets one of these.
+/// Conditions that end a path by arc length: it ends at the first state that meets one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Stop {
     /// Size of the load factor.
@@ -70,7 +70,7 @@ pub struct Stop {
 }
 
 impl ImplicitBodies {
-    /// All that an assembly holds, starting at rest: its shells are of its first body.
+    /// Returns the bodies of an assembly, starting at rest; its shells are of its first body.
     pub(crate) fn alone(model: Arc<Assembly>) -> Self {
         let cells = match model.facets.len() as u32 {
             0 => BodyCells::Solids,
@@ -80,7 +80,7 @@ impl ImplicitBodies {
         Self { model, cells: vec![cells], start, control: None, surface: None }
     }
 
-    /// How many triangles a shell has, and their volume at rest [m³]; `None` of a solid.
+    /// Number of triangles of a shell, and their volume at rest [m³]; `None` for a solid.
     pub fn size(&self, body: usize) -> Option<(usize, f64)> {
         let BodyCells::Facets(range) = self.cells.get(body)? else { return None };
         let facets = &self.model.facets[range.start as usize..range.end as usize];
@@ -113,7 +113,7 @@ impl ImplicitBodies {
         ]
     }
 
-    /// Whether only membranes hold a node.
+    /// True if only membranes hold a node.
     pub(crate) fn is_slack(&self, node: u32) -> bool {
         let mut facets = self.model.facets.iter().filter(|facet| facet.nodes.contains(&node)).peekable();
         facets.peek().is_some() && facets.all(|facet| !facet.bends())

@@ -1,17 +1,17 @@
 //! Contact between participants: the surface of one whose equations are solved is coupled into the contacts
 //! of an explicit one.
 //!
-//! The implicit participant takes its step H. Its surface then goes from where it was to where it is, at the
-//! same speed, and the explicit one takes its steps h against it, as against a tool. Their impulses P give
-//! the mean force P/H on the implicit participant. The step is repeated with this force until the force on
-//! the surface differs from it by less than a part of [`FOUND`], [`PASSES`] times at most. The rest acts in
-//! the next step, so that momentum is kept.
+//! The implicit participant takes its step H. Its surface then moves from its old to its new place at
+//! constant speed. The explicit participant takes its steps h against this surface, as against a tool. Its
+//! impulses P give the mean force P/H on the implicit participant. The step is repeated with this force,
+//! [`PASSES`] times at most. It ends when the force on the surface differs by less than a part of [`FOUND`].
+//! The rest acts in the next step, so that momentum is kept.
 //!
-//! In a pass the surface feels f − k (x − x̄), with f and x̄ of the pass before: at the end nothing but f.
-//! The impedance of an explicit body with the mass m of a surface node is 2 m/h, so that its force changes by
-//! 2 m/(h H) (x − x̄) in the step. With twice that as k, passes come together for walls of a hundredth of the
-//! mass of a node and for heavy ones, with and without stiffness; with half of that they do not (measured
-//! with bars).
+//! In a pass the surface feels f − k (x − x̄), with f and x̄ of the pass before: at the end only f. The
+//! impedance of an explicit body with the mass m of a surface node is 2 m/h. So its force changes by 2 m/(h
+//! H) (x − x̄) in the step. With twice that as k, passes converge for walls of a hundredth of the mass of a
+//! node and for heavy ones. This holds with and without stiffness. With half of that they do not converge
+//! (measured with bars).
 
 use std::ops::Range;
 
@@ -26,7 +26,7 @@ use crate::failure::Failure;
 use crate::part::{Method, Part};
 use crate::participant::Participant;
 
-/// Difference of the forces on both sides, over that of the impulses, at which a step is found.
+/// Difference of the forces on both sides at which a step is found, over the mean force of the impulses.
 const FOUND: f64 = 0.01;
 /// Times that a step is taken at most.
 const PASSES: u32 = 6;
@@ -54,30 +54,30 @@ pub struct CoupledSurfaceNow {
     pub forces: [Vector<f64>; 2],
     /// Mean of the times that a step in contact was taken.
     pub passes: f64,
-    /// The largest difference of the forces on both sides in a step, over that of the impulses.
+    /// The largest difference of the forces on both sides in a step, over the mean force of the impulses.
     pub worst: f64,
 }
 
-/// What a restart needs of coupled nodes.
+/// State of coupled nodes that a restart needs.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct CouplingMemory {
-    /// Of each coupled node, its force in the last step [N], and the impulse [N s] that it is still to feel.
+    /// Force of each coupled node in the last step [N], and the impulse [N s] that the node is still to feel.
     nodes: Vec<[Vector<f64>; 2]>,
-    /// Of each set, steps in contact, and how often they were taken in all.
+    /// Steps of each set in contact, and the passes that they took in all.
     counts: Vec<[u64; 2]>,
-    /// Of each set, the relative difference of the forces on both sides over the last step, and these [N].
+    /// Relative difference of the forces of each set on both sides over the last step, and these forces [N].
     last: Vec<(f64, [Vector<f64>; 2])>,
     /// The largest difference so far.
     worst: Vec<f64>,
 }
 
 impl CouplingMemory {
-    /// Whether it is of no sets.
+    /// True if there are no sets.
     pub(crate) fn is_empty(&self) -> bool {
         self.counts.is_empty()
     }
 
-    /// Whether it is of these sets, or of none.
+    /// True if the memory belongs to some sets, or is empty.
     pub(crate) fn fits(&self, sets: &[CoupledSurface]) -> bool {
         let coupled_nodes: usize = sets.iter().map(|set| set.nodes.len()).sum();
         let lengths = [self.nodes.len(), self.counts.len(), self.last.len(), self.worst.len()];
@@ -106,7 +106,7 @@ impl CoupledNode {
         add(self.rest, own.displacement(self.node as usize))
     }
 
-    /// Whether contacts push it.
+    /// True if contacts push the node.
     fn is_pushed(&self) -> bool {
         self.force != [0.0; 3]
     }
@@ -117,7 +117,7 @@ impl CoupledNode {
     }
 }
 
-/// Where the coupled nodes of a set are among all, and among those of its host.
+/// Ranges of the coupled nodes of a set among all coupled nodes, and among the coupled nodes of its host.
 #[derive(Clone)]
 struct Places {
     all: Range<usize>,
@@ -135,11 +135,11 @@ pub(crate) struct Meetings {
 }
 
 impl Meetings {
-    /// Those of a world, from a state on or from none; `ratios` are the steps of each participant between
-    /// common instants.
+    /// Makes the coupled nodes of a world, from a remembered state or an empty one. `ratios` are the steps of
+    /// each participant between common instants.
     ///
     /// # Errors
-    /// If participants can't meet so.
+    /// If participants cannot be coupled like this.
     pub(crate) fn new(
         sets: &[CoupledSurface],
         parts: &[Part],
@@ -205,7 +205,7 @@ impl Meetings {
         &self.memory
     }
 
-    /// Whether a participant has coupled nodes, so that its steps are against them.
+    /// True if a participant is a host: it takes its steps against coupled nodes.
     pub(crate) fn is_host(&self, part: usize) -> bool {
         self.sets.iter().any(|set| set.host == part)
     }
@@ -236,8 +236,8 @@ impl Meetings {
         self.lead(|set| set.of == part, parts, participants);
     }
 
-    /// Tells the hosts of some sets where their coupled nodes go in the step that begins where all
-    /// participants meet.
+    /// Passes to the hosts of some sets the ways of their coupled nodes in the step. The step begins where
+    /// all participants meet.
     fn lead(
         &mut self,
         of: impl Fn(&CoupledSurface) -> bool,
@@ -343,7 +343,7 @@ impl CoupledNode {
 }
 
 impl CoupledSurface {
-    /// Whether their participants can meet so.
+    /// Checks that its participants can be coupled.
     ///
     /// # Errors
     /// If one is not explicit on the CPU, the other one not implicit, or nodes are not theirs.
@@ -377,7 +377,7 @@ impl CoupledSurface {
     }
 }
 
-/// Surfaces of a host's contacts that have nodes of a set, and those that touch these.
+/// Contacts of a host whose surfaces have nodes of a set.
 fn surfaces<'a>(host: &'a Part, coupled_nodes: &Range<u32>) -> impl Iterator<Item = &'a Contact> {
     let coupled_nodes = coupled_nodes.clone();
     let all = host.method.contacts().into_iter().flat_map(|contacts| &contacts.contacts);

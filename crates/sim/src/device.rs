@@ -18,12 +18,13 @@ pub type MappedPoint = ([f64; 3], Vec<(u32, f64)>);
 pub struct OnDevice<'a> {
     pub(crate) stepper: &'a mut GpuStepper,
     pub(crate) state: &'a mut State<f32>,
-    /// Whether forces belong to the simulation's instant.
+    /// True if forces belong to the simulation's instant.
     pub(crate) evaluated: &'a mut bool,
 }
 
 impl OnDevice<'_> {
-    /// Goes up to `steps` steps on without reading anything back, as many as take about `within`. How many.
+    /// Takes up to `steps` steps without reading anything back, as many as take about `within`. Returns their
+    /// number.
     ///
     /// # Errors
     /// If the device fails; a step that fails is reported at the next evaluation.

@@ -8,7 +8,7 @@ use serde::{Serialize, Serializer};
 
 use pliant_geometry::words::number;
 
-/// What kind of failure it is: words of `--json` and of exceptions in Python.
+/// Kind of a failure: words of `--json` and of exceptions in Python.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FailureKind {
     /// A displacement is not finite.
@@ -23,7 +23,7 @@ pub enum FailureKind {
     Singular,
     /// No equilibrium was found.
     NotConverged,
-    /// A tool or a constraint cannot go on.
+    /// A tool or a constraint is blocked.
     Blocked,
     /// Surfaces go through each other.
     Intersecting,
@@ -35,7 +35,7 @@ pub enum FailureKind {
     Device,
     /// An output could not be written.
     Output,
-    /// What was asked for cannot be simulated.
+    /// The input cannot be simulated.
     Input,
     /// Someone stopped the run.
     Interrupted,
@@ -62,7 +62,7 @@ impl FailureKind {
         }
     }
 
-    /// Whether shorter steps may help: what explicit steps that are too long end by.
+    /// True if shorter steps may help: these failures end explicit steps that are too long.
     pub(crate) fn is_of_long_steps(self) -> bool {
         matches!(self, Self::NotFinite | Self::Inverted | Self::Unbalanced | Self::Unstable)
     }
@@ -95,11 +95,11 @@ pub struct Failure {
     pub time: Option<f64>,
     /// The load step, or the step whose equations were not solved.
     pub load_step: Option<Box<FailedLoadStep>>,
-    /// What could not go on, where it is `blocked`.
+    /// The blocked tool or constraint, where the kind is `blocked`.
     pub blocked: Option<Box<BlockedDriver>>,
-    /// What happened and what to try.
+    /// Message: the cause and a remedy.
     pub message: String,
-    /// What to try, as the message says it at its end; empty where it says it otherwise.
+    /// The remedy at the end of the message; empty where the message says it otherwise.
     #[serde(skip)]
     pub remedy: &'static str,
 }
@@ -109,7 +109,7 @@ pub struct Failure {
 pub struct FailedLoadStep {
     /// Its number, counted from 1.
     pub number: u64,
-    /// How many there are.
+    /// Number of load steps.
     pub of: u64,
     /// Iterations spent on the last try.
     pub iterations: usize,
@@ -165,12 +165,12 @@ impl Failure {
         Self::new(FailureKind::Interrupted, message, Some(time))
     }
 
-    /// Whether someone asked for it.
+    /// True if the user interrupted the run.
     pub fn is_interrupted(&self) -> bool {
         self.kind == FailureKind::Interrupted
     }
 
-    /// The same failure with another remedy.
+    /// Returns the failure with another remedy.
     #[must_use]
     pub fn advised(mut self, remedy: &str) -> Self {
         if let Some(cause) = self.message.strip_suffix(self.remedy).filter(|_| !self.remedy.is_empty()) {
@@ -180,7 +180,8 @@ impl Failure {
         self
     }
 
-    /// A load step, counted from 1 (0: what acts at the start), of so many that came to no equilibrium.
+    /// Makes the failure of a load step without equilibrium, counted from 1 (0: the loads at the start), out
+    /// of `of`.
     pub(crate) fn load_step(error: &RelaxationError, number: u64, of: u64) -> Self {
         let which = match number {
             0 => "the loads at t = 0".to_owned(),
@@ -236,7 +237,7 @@ impl From<&StepError> for Failure {
     }
 }
 
-/// What a panic says.
+/// Returns the message of a panic.
 pub fn panicked(panic: &(dyn Any + Send)) -> &str {
     let text = panic.downcast_ref::<String>().map(String::as_str);
     text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message")

@@ -51,7 +51,7 @@ pub trait Instant {
     /// Force [N] that holds or moves the nodes of a constraint, summed.
     fn reaction(&self, constraint: usize) -> [f64; 3];
 
-    /// What a constraint of volume encloses; `None` of others.
+    /// Volume that a constraint of volume encloses; `None` for other constraints.
     fn enclosed(&self, _constraint: usize) -> Option<Enclosed> {
         None
     }
@@ -61,8 +61,8 @@ pub trait Instant {
         Vec::new()
     }
 
-    /// Moment [N m] about the origin of the force of each contact on the rigid thing that it is with, in the
-    /// order of the contacts; `None` where it is not found: on a GPU.
+    /// Moment [N m] about the origin of the force of each contact on its rigid thing, in the order of the
+    /// contacts. `None` where the moments are not found: on a GPU.
     fn contact_moments(&self) -> Option<Vec<[f64; 3]>> {
         None
     }
@@ -72,25 +72,25 @@ pub trait Instant {
         Vec::new()
     }
 
-    /// Where a tool or a jaw goes that was driven from outside, by its place among the rigid things of the
+    /// Way of a tool or a jaw that was driven from outside, by its index among the rigid things of the
     /// contacts.
     fn leg(&self, _rigid: usize) -> Option<&Leg> {
         None
     }
 
-    /// How far a rigid thing lags behind its trajectory since its force is limited, by its place among those
-    /// of the contacts.
+    /// Lag of a rigid thing with limited force behind its trajectory, by its index among the rigid things of
+    /// the contacts.
     fn lag(&self, _rigid: usize) -> Option<&Lag> {
         None
     }
 
-    /// How far the nodes of a constraint lag behind their motion since their force is limited, or its volume
-    /// [m³], along the first axis, since its pressure is.
+    /// Lag of the nodes of a constraint with limited force behind their motion. For a volume with limited
+    /// pressure, the first axis has the lag of the volume [m³].
     fn lag_of_constraint(&self, _constraint: usize) -> Option<&Lag> {
         None
     }
 
-    /// The pose of a rigid thing, of a jaw that of its tool, and the angle [rad] between the jaws.
+    /// Pose of a rigid thing, or of the tool of a jaw, and the angle [rad] between the jaws.
     fn posture(&self, number: usize, rigid: &Rigid) -> (Pose, f64) {
         let (pose, opening) = rigid.posture(self.time(), self.leg(number));
         (Translation3::from(self.lag(number).map(Lag::now).unwrap_or_default()) * pose, opening)
@@ -102,7 +102,7 @@ pub trait Instant {
         Translation3::from(lag) * rigid.at(self.time(), self.leg(number))
     }
 
-    /// Where and how large a rigid thing is, of a jaw its own.
+    /// Pose and growth of a rigid thing; a jaw has its own pose.
     fn stance(&self, number: usize, rigid: &Rigid) -> Stance {
         Stance { pose: self.pose(number, rigid), growth: rigid.trajectory.growth(self.time()) }
     }
@@ -120,7 +120,7 @@ pub trait Instant {
         None
     }
 
-    /// Whether it is computed in single precision.
+    /// True if the participant is computed in single precision.
     fn is_single(&self) -> bool;
 
     /// Energy [J] above which the balance of energies is judged; infinite where it never is.
@@ -136,7 +136,7 @@ pub trait Instant {
         Stability::default()
     }
 
-    /// How good its equilibria are; `None` of a participant that finds none by dynamic relaxation.
+    /// Quality of its equilibria; `None` for a participant without dynamic relaxation.
     fn equilibria(&self) -> Option<Equilibria> {
         None
     }
@@ -156,13 +156,13 @@ pub trait Instant {
         None
     }
 
-    /// Why it has ended before its last step.
+    /// Reason why it has ended before its last step.
     fn ended(&self) -> Option<&str> {
         None
     }
 }
 
-/// What the equations of an implicit or a static run took.
+/// Effort for the equations of an implicit or a static run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Effort {
     /// Iterations of Newton's method in all.

@@ -1,6 +1,7 @@
-//! A simulation of many bodies. A [`World`] holds participants: bodies that one stepper advances together,
-//! with explicit, quasi-static, static or implicit steps, on the CPU or (feature `gpu`, on by default) a GPU.
-//! A [`Simulation`] owns a world and its state, and knows nothing of files or windows. SI units throughout.
+//! A simulation of many bodies. A [`World`] holds participants: bodies that one stepper advances together.
+//! Steps are explicit, quasi-static, static or implicit. They run on the CPU or (feature `gpu`, on by
+//! default) a GPU. A [`Simulation`] owns a world and its state, and knows nothing of files or windows. SI
+//! units throughout.
 //!
 //! Two participants, each at its own step:
 //!

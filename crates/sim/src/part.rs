@@ -42,13 +42,13 @@ pub struct Part {
     pub name: String,
     /// Nodes, bodies, names of constraints and carried surfaces; solids, too.
     pub model: Arc<Model>,
-    /// How it is stepped.
+    /// Method that steps it.
     pub method: Method,
     /// Its steps.
     pub steps: Steps,
 }
 
-/// How the state of a participant goes from instant to instant.
+/// Method that advances the state of a participant from instant to instant.
 #[derive(Clone, Debug)]
 pub enum Method {
     /// Solids with inertia, by central differences.
@@ -57,7 +57,7 @@ pub enum Method {
     QuasiStatic {
         /// The number type.
         precision: Precision,
-        /// Relative residual of an equilibrium; `None`: that of the number type.
+        /// Relative residual of an equilibrium; `None`: the default of the number type.
         tolerance: Option<f64>,
     },
     /// Shells with inertia, by central differences.
@@ -79,7 +79,7 @@ pub struct ShortSteps {
 /// Settings of implicit steps.
 #[derive(Clone, Debug)]
 pub struct LongSteps {
-    /// How they are solved.
+    /// Settings of their solution.
     pub settings: DynamicSettings,
     /// The GPU that solves their linear equations; `None`: the CPU.
     #[cfg(feature = "gpu")]
@@ -87,7 +87,7 @@ pub struct LongSteps {
 }
 
 impl From<DynamicSettings> for LongSteps {
-    /// On the CPU.
+    /// Makes long steps on the CPU.
     fn from(settings: DynamicSettings) -> Self {
         Self {
             settings,
@@ -102,7 +102,7 @@ impl From<DynamicSettings> for LongSteps {
 pub struct Explicit {
     /// The number type; single on a GPU.
     pub precision: Precision,
-    /// What happens when the critical time step falls below the step.
+    /// Action when the critical time step falls below the step.
     pub on_unstable: OnUnstable,
     /// The critical time step of the assembled model at rest [s]; where it is infinite it is not monitored.
     pub critical_step: f64,
@@ -113,7 +113,7 @@ pub struct Explicit {
     /// The GPU; `None`: the CPU.
     #[cfg(feature = "gpu")]
     pub device: Option<Device>,
-    /// How its kernels bring forces from cells to nodes; `None`: the way that measured best.
+    /// Method by which its kernels bring forces from cells to nodes; `None`: the fastest one in measurements.
     #[cfg(feature = "gpu")]
     pub design: Option<Design>,
 }
@@ -126,7 +126,7 @@ impl Explicit {
 }
 
 impl Method {
-    /// Shells, and solids whose equations are solved, with all they need beside the model.
+    /// Shells, and solids whose equations are solved, with all data that they need in addition to the model.
     pub fn bodies(&self) -> Option<&Arc<ImplicitBodies>> {
         match self {
             Self::ExplicitShells(bodies, _) | Self::Static(bodies, _) | Self::Implicit(bodies, _) => {
@@ -147,7 +147,7 @@ impl Method {
         }
     }
 
-    /// Whether its stepper takes forces on nodes from outside; that on a GPU takes none.
+    /// True if its stepper takes forces on nodes from outside; a stepper on a GPU takes none.
     pub(crate) fn takes_forces(&self) -> bool {
         #[cfg(feature = "gpu")]
         if let Self::Explicit(Explicit { device, .. }) = self {
@@ -167,14 +167,15 @@ impl Method {
     }
 }
 
-/// Bytes that a solver takes at least for a tet or hex and for a shell, beside the model: by the largest
-/// memory of `pliant run` less that of `pliant check` with growing blocks and plates, 172, 3,250 and 7,800.
+/// Least memory in bytes of a solver for a tet or hex and for a shell, in addition to the model. Growing
+/// blocks and plates gave 172, 3,250 and 7,800: the largest memory of `pliant run` less the largest of
+/// `pliant check`.
 const EXPLICIT_CELL: u64 = 150;
 const IMPLICIT_CELL: u64 = 3000;
 const IMPLICIT_SHELL: u64 = 7000;
 
 impl Part {
-    /// Bytes that its solver takes at least, beside the model.
+    /// Least memory in bytes of its solver, in addition to the model.
     fn bytes(&self) -> u64 {
         let cells = self.model.cell_count() as u64;
         match &self.method {
@@ -186,7 +187,7 @@ impl Part {
         }
     }
 
-    /// Whether the system has room for its solver.
+    /// Checks that the system has room for its solver.
     ///
     /// # Errors
     /// If it has not.
@@ -197,7 +198,7 @@ impl Part {
         })
     }
 
-    /// Whether its steps are cut where they are too long.
+    /// True if its steps are cut where they are too long.
     pub(crate) fn cuts_steps(&self) -> bool {
         let Method::Explicit(settings) = &self.method else { return false };
         settings.on_unstable == OnUnstable::Substep && settings.critical_step.is_finite()
@@ -227,16 +228,16 @@ impl Part {
         Ok(Self { name: name.into(), model, method: Method::Explicit(settings), steps })
     }
 
-    /// Equilibria of solids in double precision at the ends of so many equal load steps within a duration
-    /// [s].
+    /// Makes a participant of solids with equilibria in double precision, at the ends of equal load steps
+    /// within a duration [s].
     pub fn quasi_static(name: &str, model: impl Into<Arc<Model>>, duration: f64, load_steps: u64) -> Self {
         let method = Method::QuasiStatic { precision: Precision::Double, tolerance: None };
         let steps = Steps::within(duration, duration / load_steps.max(1) as f64);
         Self { name: name.into(), model: model.into(), method, steps }
     }
 
-    /// Equilibria of shells and solids by Newton's method, at the ends of so many equal load steps within a
-    /// duration [s].
+    /// Makes a participant of shells and solids with equilibria by Newton's method, at the ends of equal load
+    /// steps within a duration [s].
     pub fn equilibria(name: &str, model: impl Into<Arc<Assembly>>, duration: f64, load_steps: u64) -> Self {
         let assembly = model.into();
         let model = Arc::clone(&assembly.model);

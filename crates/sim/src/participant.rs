@@ -25,8 +25,8 @@ pub(crate) trait Participant: Instant + Send {
     /// If forces can't be found there.
     fn evaluate(&mut self, wanted: Wanted) -> Result<(), Failure>;
 
-    /// Goes so many steps on from an evaluated instant, not more than its stride. `watch` hears how far it
-    /// is, if that takes long.
+    /// Takes a number of steps from an evaluated instant, not more than its stride. `watch` gets progress
+    /// reports, if the steps take long.
     ///
     /// # Errors
     /// If a step can't be taken.
@@ -79,7 +79,7 @@ pub(crate) trait Participant: Instant + Send {
         None
     }
 
-    /// Whether it can go back to a state of its part; else it is made anew for that.
+    /// True if it can go back to a state of its part; else the caller makes it anew.
     fn goes_back_to(&self, snapshot: &Snapshot) -> bool;
 
     /// Goes back to a state that it [can](Self::goes_back_to), with the clock of explicit steps and their
@@ -100,16 +100,16 @@ pub(crate) trait Participant: Instant + Send {
         Ok(())
     }
 
-    /// The state and what a restart needs beside it, after [`advance`](Self::advance).
+    /// Returns the state and the other data that a restart needs, after [`advance`](Self::advance).
     fn snapshot(&self) -> Snapshot;
 
-    /// Adds what a checkpoint has beside that: the residuals of iterations so far.
+    /// Adds to a snapshot the data that only a checkpoint has: the residuals of iterations so far.
     fn add_log(&self, _snapshot: &mut Snapshot) {}
 
     /// Forgets what it notes of iterations after the present state.
     fn cut_log(&mut self) {}
 
-    /// How its steps are counted, of a stepper whose increments tell velocities.
+    /// Clock of its steps; `None` for a stepper whose increments do not give velocities.
     fn clock(&self) -> Option<Clock> {
         None
     }
@@ -117,8 +117,8 @@ pub(crate) trait Participant: Instant + Send {
     /// A fingerprint of the motion: the same bits have the same one.
     fn fingerprint(&self) -> u64;
 
-    /// After a step that failed: whether the state found on the way is worth showing; the time is then that
-    /// of it.
+    /// Returns true, after a step that failed, if the state found on the way is worth showing. The time is
+    /// then the time of that state.
     fn keeps_what_it_found(&mut self) -> bool {
         false
     }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::bodies::{RunControl, Stop};
 
-/// How far a run by arc length is.
+/// Progress of a run by arc length.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Path {
     /// Load factor at the step before.
@@ -16,14 +16,14 @@ pub(crate) struct Path {
     pub(crate) change: f64,
     #[serde(deserialize_with = "count::read")]
     pub(crate) limit_points: u32,
-    /// Why it ended before its last step.
+    /// Reason why it ended before its last step.
     pub(crate) ended: Option<String>,
-    /// Of a path that is kept, [where it goes on](Statics::direction).
+    /// Direction in which a kept path [continues](Statics::direction).
     pub(crate) direction: Vec<f64>,
 }
 
 impl Path {
-    /// Whether it is one of so many nodes.
+    /// True if the path belongs to a model with this number of nodes.
     pub(crate) fn fits(&self, nodes: usize) -> bool {
         self.direction.is_empty() || self.direction.len() == 6 * nodes
     }
@@ -35,7 +35,7 @@ impl Path {
         (self.factor, self.change) = (factor, change);
     }
 
-    /// Why it ends here, if it does.
+    /// Returns the reason why the path ends here, if it does.
     pub(crate) fn end(&self, stop: &Stop, state: &State, model: &Assembly) -> Option<String> {
         let limit = number(stop.load_factor.unwrap_or(f64::INFINITY));
         if stop.load_factor.is_some_and(|limit| self.factor.abs() >= limit) {
@@ -52,7 +52,7 @@ impl Path {
     }
 }
 
-/// What the load step of a number (counted from 1) prescribes.
+/// Returns the control of the load step of a number (counted from 1).
 pub(crate) fn part_of(control: RunControl, number: u64, of: u64) -> pliant_implicit::Control {
     match control {
         RunControl::Displacement { node, component, by } => {

@@ -1,18 +1,18 @@
 //! Ties between participants: springs with dashpots between points of bodies that are stepped apart.
 //!
 //! With the gap g between two points and their relative velocity v, the points pull at each other by f = k
-//! g + c v. The participant with the longer steps H goes first; the other one feels the spring at each of its
+//! g + c v. The participant with the longer steps H goes first. The other one feels the spring at each of its
 //! own steps h, with the first one on a straight way in between. Its impulses h f, summed over a step of the
-//! first one, push that one back in its next step: action equals reaction, later by (H − h)/2. An implicit
+//! first one, push that one back in its next step. Action equals reaction, later by (H − h)/2. An implicit
 //! participant solves for the force together with its motion.
 //!
-//! The spring needs the dashpot: with a = k H²/m, b = c H/m and the vibrations Ω = ω² H² of a body, the
-//! delayed force leaves the central differences of that body stable for a/2 < b and Ω + 2 b < 4 (from the
-//! characteristic polynomial; with a = 1.5 b, vibrations of two bodies without damping were seen to grow).
-//! Ties take [`SPRING`] for a/b, and a and 2 b of what vibrations leave, summed over the points of a node:
-//! they are as stiff as the lightest nodes and the longest step allow. A body at 0.9 of its critical time
-//! step leaves little; at half of that its side of the tie is some twenty times stiffer. A tie opens by f/k
-//! under a lasting force f, which is [reported](TieNow).
+//! The spring needs the dashpot. Let a = k H²/m and b = c H/m, and let Ω = ω² H² be the vibrations of a body.
+//! The delayed force leaves the central differences of that body stable for a/2 < b and Ω + 2 b < 4 (from the
+//! characteristic polynomial). With a = 1.5 b, vibrations of two bodies without damping were seen to grow.
+//! Ties take [`SPRING`] for a/b, and a and 2 b of the margin that vibrations leave, summed over the points of
+//! a node. They are as stiff as the lightest nodes and the longest step allow. A body at 0.9 of its critical
+//! time step leaves little margin. At half of that step its side of the tie is some twenty times stiffer. A
+//! tie opens by f/k under a lasting force f, which is [reported](TieNow).
 
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::mapping::{Weights, weighted};
@@ -23,7 +23,7 @@ use crate::failure::Failure;
 use crate::part::{Method, Part};
 use crate::participant::Participant;
 
-/// a/b: the stiffness k is that many times c/H.
+/// Ratio a/b: the stiffness k is this ratio times c/H.
 const SPRING: f64 = 1.0;
 /// The part of the limit of stability that ties and vibrations of a body take together.
 const ALL: f64 = 0.96;
@@ -48,8 +48,8 @@ pub struct TieNow<'a> {
     pub name: &'a str,
     /// Its points.
     pub points: usize,
-    /// Force [N] on each participant, summed over the points: on the one with the longer steps the mean of
-    /// what the other one has felt since its last step.
+    /// Force [N] on each participant, summed over the points. The participant with the longer steps has the
+    /// mean of the other one's forces since its last step.
     pub forces: [Vector<f64>; 2],
     /// The widest gap of a point [m].
     pub gap: f64,
@@ -57,10 +57,10 @@ pub struct TieNow<'a> {
     pub widest: f64,
 }
 
-/// What a restart needs of the ties of a world.
+/// State of the ties of a world that a restart needs.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct TieMemory {
-    /// Of each point, the force on its slower and its faster side [N], and the impulse that the slower one is
+    /// Forces of each point on its slower and its faster side [N], and the impulse that the slower side is
     /// still to feel [N s].
     points: Vec<[Vector<f64>; 3]>,
     /// The widest gap [m] of each tie.
@@ -68,12 +68,12 @@ pub(crate) struct TieMemory {
 }
 
 impl TieMemory {
-    /// Whether it is of no ties.
+    /// True if there are no ties.
     pub(crate) fn is_empty(&self) -> bool {
         self.points.is_empty()
     }
 
-    /// Whether it is of these ties, or of none.
+    /// True if the memory belongs to some ties, or is empty.
     pub(crate) fn fits(&self, ties: &[PenaltyTie]) -> bool {
         let points: usize = ties.iter().map(|tie| tie.points[0].len()).sum();
         self.points.is_empty() || [self.points.len(), self.widest.len()] == [points, ties.len()]
@@ -118,9 +118,9 @@ impl Side {
 struct Point {
     slow: Side,
     fast: Side,
-    /// Whether the faster side is the first one of the tie.
+    /// True if the faster side is the first one of the tie.
     turned: bool,
-    /// Whether equations of the faster side are solved.
+    /// True if equations of the faster side are solved.
     solved: bool,
     /// k [N/m].
     spring: f64,
@@ -145,7 +145,7 @@ pub(crate) struct Springs {
 }
 
 impl Springs {
-    /// Those of a world, from a state on or from none.
+    /// Makes the springs of a world, from a remembered state or an empty one.
     ///
     /// # Errors
     /// If a participant takes part in no ties.
@@ -242,8 +242,8 @@ impl Springs {
         }
     }
 
-    /// Follows a step of a participant: finds the force that its springs pull it by now, and what slower ones
-    /// are to feel of it.
+    /// Follows a step of a participant: finds the present force of its springs, and the impulse that slower
+    /// participants are to feel.
     pub(crate) fn after(
         &mut self,
         part: usize,
@@ -367,17 +367,18 @@ impl PenaltyTie {
 }
 
 impl Method {
-    /// Whether the equations of each step are solved for.
+    /// True if the equations of each step are solved.
     pub(crate) fn solves_steps(&self) -> bool {
         matches!(self, Self::Implicit(..))
     }
 
-    /// Whether a step may take so long that one waits for it.
+    /// True if a step may take so long that the user waits.
     pub(crate) fn takes_long(&self) -> bool {
         self.solves_steps() || matches!(self, Self::Static(..) | Self::QuasiStatic { .. })
     }
 
-    /// Why no tie to another participant holds bodies that are stepped by it; `None` if one does.
+    /// Returns the reason why bodies of this method cannot be tied to another participant; `None` if they
+    /// can.
     pub fn untied(&self) -> Option<&'static str> {
         match self {
             Self::Static(..) | Self::QuasiStatic { .. } => {

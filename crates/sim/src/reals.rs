@@ -12,7 +12,7 @@ pub enum Reals<'a> {
 }
 
 impl Reals<'_> {
-    /// Where the first number lies.
+    /// Address of the first number.
     pub fn address(&self) -> usize {
         match self {
             Self::Single(values) => values.as_ptr().addr(),

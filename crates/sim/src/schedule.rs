@@ -1,9 +1,9 @@
-//! When an observer of a run looks.
+//! Times at which an observer of a run looks.
 
 use serde::{Deserialize, Serialize};
 
-/// When an observer looks: at the first instant, at the one nearest to each multiple of an interval, and at
-/// the last.
+/// Times at which an observer looks: the first instant, the instant nearest to each multiple of an interval,
+/// and the last.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Schedule {
     every: f64,
@@ -13,29 +13,29 @@ pub struct Schedule {
 }
 
 impl Schedule {
-    /// One that looks every so many seconds, from the start on.
+    /// Makes a schedule that looks every `every` seconds, from the start on.
     pub fn new(every: f64) -> Self {
         Self { every, seen: 0, last: f64::NEG_INFINITY }
     }
 
-    /// One that has seen all up to an instant, that included.
+    /// Makes a schedule whose observer has seen all instants up to and including this one.
     pub fn after(every: f64, time: f64, step: f64) -> Self {
         let mut schedule = Self::new(every);
         schedule.is_due(time, step, true);
         schedule
     }
 
-    /// Whether the observer has yet to see an instant.
+    /// True if the observer has yet to see an instant.
     pub fn awaits(&self, time: f64, step: f64, last: bool) -> bool {
         last || time + 0.5 * step >= self.seen as f64 * self.every
     }
 
-    /// How many steps from a time miss no instant that the observer has to see; at least one.
+    /// Number of steps from a time that miss no instant of the observer; at least one.
     pub fn stride(&self, time: f64, step: f64) -> u64 {
         steps_to(self.seen as f64 * self.every, time, step)
     }
 
-    /// Whether the observer has to see an instant; it then counts as seen.
+    /// True if the observer has to see an instant; it then counts as seen.
     pub fn is_due(&mut self, time: f64, step: f64, last: bool) -> bool {
         let due = self.awaits(time, step, last);
         if due {
@@ -45,7 +45,7 @@ impl Schedule {
         due
     }
 
-    /// Whether it was due at this instant.
+    /// True if the observer was due at this instant.
     pub fn has_seen(&self, time: f64) -> bool {
         self.last == time
     }

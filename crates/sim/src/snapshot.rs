@@ -20,19 +20,20 @@ use crate::part::{Method, Part, Precision};
 use crate::path::Path;
 use crate::solver::Memory;
 
-/// The state of a participant with all that a restart needs beside it.
+/// The state of a participant with all other data that a restart needs.
 #[derive(Clone, Debug)]
 pub(crate) enum Snapshot {
     /// In single precision.
     Single(State<f32>, Memory<f32>),
     /// In double precision.
     Double(State<f64>, Memory<f64>),
-    /// Of shells, and of solids whose equations are solved.
+    /// State of shells, and of solids whose equations are solved.
     Implicit(Box<ImplicitState>),
 }
 
 impl Snapshot {
-    /// That of a participant from its bytes; `None` where these are none, or of another size.
+    /// Reads the snapshot of a participant from bytes; `None` if the bytes are no snapshot, or of another
+    /// size.
     pub fn decode(part: &Part, bytes: &[u8]) -> Option<Self> {
         fn read<T: DeserializeOwned>(bytes: &[u8]) -> Option<T> {
             postcard::from_bytes(bytes).ok()
@@ -45,7 +46,7 @@ impl Snapshot {
         snapshot.fits(part).then_some(snapshot)
     }
 
-    /// As bytes of a checkpoint.
+    /// Returns the bytes for a checkpoint.
     ///
     /// # Errors
     /// If it can't be encoded.
@@ -87,7 +88,7 @@ impl Snapshot {
         }
     }
 
-    /// Whether it has the sizes of a participant's model, and is of its method.
+    /// True if the snapshot has the sizes of a participant's model, and is of its method.
     pub fn fits(&self, part: &Part) -> bool {
         match self {
             Self::Single(state, memory) => fits(state, memory, part),
@@ -97,7 +98,7 @@ impl Snapshot {
     }
 }
 
-/// What a resumed run needs.
+/// State that a resumed run needs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct ImplicitState {
     /// Whole steps done, and the time [s] they end at.
@@ -112,19 +113,19 @@ pub(crate) struct ImplicitState {
     pub effort: Effort,
     pub convergence: VecDeque<Iterated>,
     pub contact: Option<ContactState>,
-    /// Where tools go that are driven from outside.
+    /// Ways of tools that are driven from outside.
     pub legs: Vec<(u32, Leg)>,
     pub path: Path,
-    /// How far moved nodes whose force is limited are behind their motion, and volumes whose pressure is
-    /// limited behind their growth.
+    /// Lags of moved nodes with limited force behind their motion, and of volumes with limited pressure
+    /// behind their growth.
     pub lags: Vec<Lag>,
     /// Values of the older matrix whose factors precondition the next one.
     pub factored: Option<Vec<f64>>,
-    /// Whether forces were found at the instant, so that their work is entered.
+    /// True if forces were found at the instant, so that their work is added up.
     pub entered: bool,
 }
 
-/// What a resumed run needs to know of contacts.
+/// State of contacts that a resumed run needs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct ContactState {
     /// Forces on nodes, six a node [N], and on the second side of each contact [N].
@@ -132,18 +133,19 @@ pub(crate) struct ContactState {
     pub totals: Vec<[f64; 3]>,
     /// Their moments about the origin [N m].
     pub moments: Vec<[f64; 3]>,
-    /// Of the barriers [J].
+    /// Energy of the barriers [J].
     pub energy: f64,
     /// Nodes that touch something, increasing.
     pub touches: Vec<NodeTouch>,
-    /// Pairs of nodes in the pattern of the equations beside those of cells: the order of sums depends on it.
+    /// Pairs of nodes in the pattern of the equations in addition to the pairs of cells: the order of sums
+    /// depends on it.
     pub pairs: Vec<[u32; 2]>,
-    /// How far tools whose force is limited are behind their trajectories.
+    /// Lags of tools with limited force behind their trajectories.
     pub lags: Vec<Lag>,
 }
 
 impl ContactState {
-    /// Whether it is of a model with so many nodes and such contacts.
+    /// True if the state belongs to a model with this number of nodes and these contacts.
     fn fits(&self, nodes: usize, contacts: &Contacts) -> bool {
         let limited = contacts.rigids.iter().enumerate();
         let limited = limited.filter(|(_, rigid)| rigid.trajectory.limit().is_some());
@@ -158,7 +160,7 @@ impl ContactState {
 }
 
 impl ImplicitState {
-    /// Whether it has the sizes of a participant's model and contacts.
+    /// True if the state has the sizes of a participant's model and contacts.
     pub(crate) fn fits(&self, part: &Part) -> bool {
         let model: &Model = &part.model;
         let nodes = model.node_count();
@@ -196,7 +198,7 @@ pub(crate) struct PlainState {
     pub rotation: Vec<[f64; 4]>,
     pub velocity: Vec<[f64; 3]>,
     pub spin: Vec<[f64; 3]>,
-    /// What relaxing laws remember: whether it has begun, the tensors of each solid [Pa], and their work [J].
+    /// History of relaxing laws: whether it has begun, the tensors of each solid [Pa], and their work [J].
     pub history: (bool, Vec<Vec<Symmetric<f64>>>, Vec<f64>),
 }
 
@@ -260,11 +262,11 @@ pub(crate) struct Iterated {
     /// of implicit ones.
     pub residual: f64,
     pub allowed: f64,
-    /// Whether the attempt found its equilibrium.
+    /// True if the attempt found its equilibrium.
     pub found: bool,
 }
 
-/// Whether a state and its memory have the sizes of a participant's, and are of its method.
+/// True if a state and its memory have the sizes of a participant's, and are of its method.
 fn fits<R: Scalar>(state: &State<R>, memory: &Memory<R>, part: &Part) -> bool {
     let model: &Model = &part.model;
     let found = matches!(memory, Memory::Equilibrium(_));

@@ -29,7 +29,7 @@ pub(crate) trait Numeric: Scalar {
     /// A state with its memory, kept.
     fn into_snapshot(state: State<Self>, memory: Memory<Self>) -> Snapshot;
 
-    /// The same, from what is kept; `None` of another number type.
+    /// Reads a state and its memory from a snapshot; `None` for another number type.
     fn of_snapshot(snapshot: &Snapshot) -> Option<(&State<Self>, &Memory<Self>)>;
 
     /// Vectors of nodes as they are shown.
@@ -118,7 +118,7 @@ pub(crate) struct Solids<R> {
 }
 
 impl<R: Numeric> Solids<R> {
-    /// From a state on.
+    /// Makes the participant from a state.
     ///
     /// # Errors
     /// If the stepper can't be made.
@@ -133,13 +133,13 @@ impl<R: Numeric> Solids<R> {
         Ok(Self { model: Arc::clone(&part.model), step: part.steps.step, state, solver })
     }
 
-    /// Where the nodes are.
+    /// Places of the nodes.
     fn nodes(&self) -> Displaced<'_, R> {
         Displaced { rest: &self.model.rest, displacement: &self.state.displacement, velocity: &[] }
     }
 
-    /// Takes up what a restart needs beside the state; of a run with other steps how these were counted, and
-    /// their length [s].
+    /// Takes up the memory of a restart. After a run with other steps, `steps` has their clock and their
+    /// length [s].
     pub(crate) fn resume(&mut self, memory: Memory<R>, steps: Option<(Clock, f64)>) {
         if let Some((clock, step)) = steps {
             self.solver.go_on(&clock, step, &self.state);

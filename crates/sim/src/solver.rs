@@ -18,12 +18,12 @@ use crate::failure::Failure;
 use crate::part::{Method, Part};
 use crate::steps::Steps;
 
-/// How far a load step is.
+/// Progress of a load step.
 #[derive(Clone, Copy, Debug)]
 pub struct LoadStepProgress {
     /// Its number, counted from 1.
     pub number: u64,
-    /// How many load steps there are.
+    /// Number of load steps.
     pub of: u64,
     /// The search for its equilibrium.
     pub iteration: Iteration,
@@ -31,10 +31,10 @@ pub struct LoadStepProgress {
     pub tolerance: f64,
 }
 
-/// What a solver needs beside the state to go on.
+/// Data that a solver needs besides the state to continue.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) enum Memory<R> {
-    /// Nothing.
+    /// No memory.
     #[default]
     Nothing,
     /// The equilibrium last found.
@@ -42,7 +42,7 @@ pub(crate) enum Memory<R> {
 }
 
 impl<R> Memory<R> {
-    /// Whether it is one of a model with so many nodes.
+    /// True if the memory belongs to a model with this number of nodes.
     pub(crate) fn fits(&self, nodes: usize) -> bool {
         match self {
             Self::Nothing => true,
@@ -53,13 +53,13 @@ impl<R> Memory<R> {
     }
 }
 
-/// How good the equilibria of a quasi-static run are.
+/// Quality of the equilibria of a quasi-static run.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Equilibria {
-    /// Equilibria found, that of the start and parts of load steps included.
+    /// Equilibria found, including the start and parts of load steps.
     pub found: u64,
-    /// Estimated error of the external work [J], a sum of trapezia between them; `None` where a first one
-    /// says nothing of its own.
+    /// Estimated error of the external work [J], which is a sum of trapezia between equilibria. `None` where
+    /// a first equilibrium alone gives no estimate.
     pub external_error: Option<f64>,
     /// Estimated error of the displacements over the largest one, at worst.
     pub displacement_error: f64,
@@ -67,11 +67,11 @@ pub struct Equilibria {
 
 /// Brings the state of solids in large strain from instant to instant.
 pub(crate) trait Solver<R>: Send {
-    /// Makes what can be asked belong to the state's instant, and of the state what is wanted.
+    /// Computes all observable values at the state's instant, and brings back the wanted parts of the state.
     fn evaluate(&mut self, state: &mut State<R>, wanted: Wanted) -> Result<(), Failure>;
 
-    /// Goes so many steps on from an instant that was evaluated, not more than its stride; tells now and then
-    /// how far it is, if that takes long.
+    /// Takes a number of steps from an evaluated instant, not more than its stride. `watch` gets progress
+    /// reports, if the steps take long.
     fn advance(
         &mut self,
         state: &mut State<R>,
@@ -119,15 +119,15 @@ pub(crate) trait Solver<R>: Send {
     /// Looks at a flag within steps that take long.
     fn stop_on(&mut self, _flag: &StopFlag) {}
 
-    /// As what an observer may ask.
+    /// Returns the solver as a source of observable values.
     fn observable(&self) -> &dyn Observable<R>;
 
-    /// Whether it goes on from any state of ordinary memory.
+    /// True if it can continue from any state of ordinary memory.
     fn goes_back(&self) -> bool {
         true
     }
 
-    /// What a restart needs beside the state, after [`advance`](Self::advance): nothing where
+    /// Data that a restart needs besides the state, after [`advance`](Self::advance): nothing where
     /// [`evaluate`](Self::evaluate) finds everything anew.
     fn memory(&self) -> Memory<R> {
         Memory::Nothing
@@ -136,15 +136,15 @@ pub(crate) trait Solver<R>: Send {
     /// Takes that up again.
     fn resume(&mut self, _memory: Memory<R>) {}
 
-    /// How its steps are counted, of a solver whose increments tell velocities.
+    /// Clock of its steps; `None` for a solver whose increments do not give velocities.
     fn clock(&self, _state: &State<R>) -> Option<Clock> {
         None
     }
 
-    /// Goes on where another solver, with steps of length `step` [s], has stood at a state.
+    /// Continues from a state of another solver with steps of length `step` [s].
     fn go_on(&mut self, _clock: &Clock, _step: f64, _state: &State<R>) {}
 
-    /// How good its equilibria are; `None` of one that finds none by dynamic relaxation.
+    /// Quality of its equilibria; `None` for a solver without dynamic relaxation.
     fn equilibria(&self) -> Option<Equilibria> {
         None
     }
@@ -243,7 +243,7 @@ impl<R: Scalar> Solver<R> for CentralDifference<R> {
 /// Equilibria at the start and at the ends of load steps.
 struct LoadSteps<R> {
     relaxation: DynamicRelaxation<R>,
-    /// Where they end.
+    /// Instants at which the load steps end.
     steps: Steps,
     /// Relative residual of an equilibrium.
     tolerance: f64,

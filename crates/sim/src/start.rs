@@ -41,17 +41,16 @@ fn at_start<R: Numeric>(part: &Part) -> Result<State<R>, Failure> {
     Ok(state)
 }
 
-/// The steps of a run whose state goes on with other numbers: how they are counted, their length [s], and the
-/// model.
+/// The steps of a run whose state continues with other values: their clock, their length [s], and the model.
 pub(crate) struct Before<'a> {
     pub clock: Clock,
     pub step: f64,
-    /// That of the run before, where it is another one.
+    /// The model of the run before, where it is another one.
     pub model: Option<&'a Model>,
 }
 
-/// A participant that goes on from a state of a run of the same mesh, of explicit steps with what they were.
-/// `None` where this one has another solver, precision or size.
+/// Makes a participant that continues from a state of a run of the same mesh. Explicit steps need the clock
+/// and length of the steps before. `None` where this participant has another solver, precision or size.
 ///
 /// # Errors
 /// If its stepper can't be made.

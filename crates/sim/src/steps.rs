@@ -12,14 +12,14 @@ pub const SAFETY: f64 = 0.9;
 pub struct Steps {
     /// Length of a step [s]. Of unequal load steps the mean.
     pub step: f64,
-    /// How many there are: for the numbers of load steps, and the parts of a load that is controlled.
+    /// Number of steps: for the numbers of load steps, and the parts of a load that is controlled.
     pub number: u64,
-    /// Where load steps end [s], if they are not equal.
+    /// Times [s] at which load steps end, if they are not equal.
     pub ends: Option<Vec<f64>>,
 }
 
 impl Steps {
-    /// So many equal steps of a duration [s], each as long as `longest` [s] or shorter.
+    /// Makes equal steps of a duration [s], each as long as `longest` [s] or shorter.
     pub fn within(duration: f64, longest: f64) -> Self {
         let number = (duration / longest - 1e-9).ceil().max(1.0);
         Self { step: duration / number, number: number as u64, ends: None }
@@ -61,12 +61,12 @@ impl Steps {
 pub struct Critical {
     /// The smallest element bound.
     pub bound: ElementBound,
-    /// That of the assembled model.
+    /// Critical step of the assembled model.
     pub assembled: CriticalStep,
 }
 
 impl Critical {
-    /// Of a model; `None` without cells.
+    /// Computes the critical steps of a model; `None` without cells.
     ///
     /// # Errors
     /// If constraints contradict one another.

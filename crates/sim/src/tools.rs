@@ -13,7 +13,7 @@ use crate::simulation::{Frame, Simulation};
 /// A tool or an obstacle at an instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ToolNow {
-    /// Where its frame is.
+    /// Pose of its frame.
     pub pose: Pose,
     /// The angle [rad] between its jaws; 0 without any.
     pub opening: f64,
@@ -83,10 +83,10 @@ pub fn pose_of([x, y, z]: [f64; 3], quaternion: [f64; 4]) -> Option<Pose> {
 /// ```
 impl Simulation {
     /// Drives a tool or an obstacle to a pose within a time [s], on a straight way and the shortest arc from
-    /// where it is. There it stays; the trajectory that it has in the scene is left. When it arrives [s]:
-    /// later than asked for where nodes would be passed over on the way, and after one step at the earliest.
-    /// The step under way, if its forces are found, is the last one of the motion before. Its jaws go on as
-    /// they were going.
+    /// its present pose. There it stays; it leaves the trajectory that it has in the scene. Returns the time
+    /// of arrival [s]. This is later than the given time where nodes would be passed over on the way, and
+    /// after one step at the earliest. The step under way, if its forces are found, is the last one of the
+    /// motion before. Its jaws continue their motion.
     ///
     /// # Errors
     /// If there is no tool of this name, or a number is not finite.
@@ -94,8 +94,8 @@ impl Simulation {
         self.lead(tool, Some(pose), None, within)
     }
 
-    /// Opens or closes the jaws of a tool to an angle [rad] within a time [s]. When they are there [s]. The
-    /// tool goes on as it was going.
+    /// Opens or closes the jaws of a tool to an angle [rad] within a time [s]. Returns the time of arrival
+    /// [s]. The tool continues its motion.
     ///
     /// # Errors
     /// If there is no tool of this name, or a number is not finite.
@@ -103,8 +103,8 @@ impl Simulation {
         self.lead(tool, None, Some(opening), within)
     }
 
-    /// Drives a tool to a pose and its jaws to an angle [rad], which arrive together; what is not given goes
-    /// on as it was going. When they are there [s].
+    /// Drives a tool to a pose and its jaws to an angle [rad], which arrive together. A part without a goal
+    /// continues its motion. Returns the time of arrival [s].
     ///
     /// # Errors
     /// If there is no tool of this name, or a number is not finite.
@@ -172,7 +172,7 @@ impl Frame<'_> {
 
 impl Simulation {
     /// A tool, an obstacle, or a jaw (`grasper.upper`, `grasper.lower`), with the force found last; `None`
-    /// without one of this name. The pose of a jaw is that of its shape.
+    /// without one of this name. The pose of a jaw is the pose of its shape.
     pub fn tool(&self, name: &str) -> Option<ToolNow> {
         let mut found: Option<ToolNow> = None;
         for (part, now) in self.world().parts.iter().zip(self.instants()) {

@@ -111,8 +111,8 @@ fn a_state_goes_on_with_the_same_bits_in_every_method() {
     }
 }
 
-/// Whoever looks before a state is taken, and whoever goes on from that state, changes no bit of what
-/// follows; energies and reactions are found again as they were.
+/// Reading before a state is taken, and continuing from that state, changes no bit of the later motion.
+/// Energies and reactions are found again with the same values.
 #[test]
 fn a_state_can_be_taken_at_a_look_in_every_method() {
     for part in parts(1e5) {
@@ -266,8 +266,8 @@ fn on(simulation: &Simulation, nodes: &[u32], force: [f64; 3]) -> Vec<[f64; 3]> 
     forces
 }
 
-/// Forces that nodes are pushed with do external work f u, and in the end the base bears them; once they end,
-/// nothing of them is left.
+/// Forces that push nodes do external work f u, and in the end the base bears them. Once they end, they have
+/// no effect.
 #[test]
 fn a_pushed_cube_comes_to_rest_against_its_base() {
     const FORCE: [f64; 3] = [0.3, -0.2, 0.5];
@@ -337,7 +337,7 @@ fn pushed_nodes_are_borne_in_equilibrium() {
     }
 }
 
-/// Nothing takes the work of forces on explicit shells but motion and strain.
+/// Only motion and strain take the work of forces on explicit shells.
 #[test]
 fn forces_on_explicit_shells_do_work() {
     let part = parts(1e5).into_iter().find(|part| matches!(part.method, Method::ExplicitShells(..))).unwrap();

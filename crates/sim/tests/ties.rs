@@ -1,4 +1,4 @@
-//! Ties between participants that take steps of their own.
+//! Ties between participants with different steps.
 
 use nalgebra::Vector3;
 use pliant_implicit::Shell;
@@ -44,7 +44,7 @@ fn points(nodes: [u32; 4]) -> Weights {
     Weights::from_rows(nodes.map(|node| [(node, 1.0)]).iter().map(|row| &row[..]))
 }
 
-/// Two columns glued end to end, at steps so many times finer than the automatic ones.
+/// Two columns glued end to end, at steps `finer` times finer than the automatic ones.
 fn glued(lower: Model, upper: Model, duration: f64, finer: u64) -> World {
     let part = |name, model| {
         let part = Part::explicit(name, model, duration).unwrap();
@@ -59,7 +59,7 @@ fn glued(lower: Model, upper: Model, duration: f64, finer: u64) -> World {
     World { ties, ..World::new(vec![part("lower", lower), part("upper", upper)]) }
 }
 
-/// Momentum [kg m/s] along the columns, with that which the slower one is still to feel.
+/// Momentum [kg m/s] along the columns, with the momentum that the slower one is still to feel.
 fn momentum(simulation: &mut Simulation) -> f64 {
     let frame = simulation.frame().unwrap();
     let of = |(part, now): (&Part, &dyn pliant_sim::Instant)| -> f64 {
@@ -73,9 +73,9 @@ fn momentum(simulation: &mut Simulation) -> f64 {
     bodies + 0.5 * (0..2).map(|part| steps[part] * tie.forces[part][2]).sum::<f64>()
 }
 
-/// Forces on both sides are opposite at each instant and act for the same time: momentum stays to round-off,
-/// and the energy does not grow though impulses of the slower one hit vibrations of the faster one, whatever
-/// the ratio of their steps.
+/// Forces on both sides are opposite at each instant and act for the same time: momentum stays to round-off.
+/// The energy does not grow, whatever the ratio of the steps, though impulses of the slower body excite
+/// vibrations of the faster one.
 #[test]
 fn free_bodies_keep_their_momentum_at_steps_of_their_own() {
     for (stiffer, finer) in
@@ -133,7 +133,7 @@ fn a_load_passes_through_and_the_gap_is_reported() {
     assert!(tie.gap > 0.0 && tie.gap < 0.25 * below, "{} m of {below} m", tie.gap);
 }
 
-/// A plate of an implicit participant hangs on an explicit column; a restart goes on with the same bits.
+/// A plate of an implicit participant hangs on an explicit column; a restart continues with the same bits.
 #[test]
 fn an_implicit_body_hangs_on_an_explicit_one() {
     let duration = 2.0;

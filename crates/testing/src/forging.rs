@@ -1,4 +1,4 @@
-//! Inputs that no program has written: bytes changed where it hurts, and what became of each.
+//! Forged inputs: bytes with harmful changes, and the result of each.
 //!
 //! ```
 //! use pliant_testing::Random;
@@ -45,8 +45,8 @@ const LARGE: [&[u8]; 3] = [
 /// Lengths, counts and flags lie among the first and the last bytes, before and after long lists of numbers.
 const ENDS: usize = 200;
 
-/// Bytes with a few changes: as [`Random::damaged`] makes them, anywhere or near an end; a rare number in
-/// place of eight; a large count in place of one.
+/// Returns bytes with a few changes. [`Random::damaged`] makes them anywhere or near an end. Or a rare number
+/// takes the place of eight bytes, or a large count the place of one.
 pub fn forged(random: &mut Random, bytes: &[u8]) -> Vec<u8> {
     let far = bytes.len().saturating_sub(ENDS);
     let mut changed = bytes.to_vec();
@@ -77,20 +77,20 @@ pub fn forged(random: &mut Random, bytes: &[u8]) -> Vec<u8> {
     }
 }
 
-/// What inputs came to.
+/// Results of the attempts with inputs.
 #[derive(Debug, Default)]
 pub struct Attempts {
-    /// Those that were taken, and those that were refused.
+    /// Number of inputs that were taken, and of inputs that were refused.
     pub taken: u64,
     /// See [`taken`](Self::taken).
     pub refused: u64,
-    /// The longest that one took, and its seed.
+    /// Longest time of an input, and its seed.
     pub longest: (Duration, u64),
-    /// Panics: message and place, how often, the first seed and where that was called from.
+    /// Panics: message and place, number, first seed and its caller.
     pub panics: BTreeMap<String, (u64, u64, String)>,
 }
 
-/// The last panic, with where it was called from.
+/// The last panic, with its caller.
 static LAST: Mutex<Option<(String, String)>> = Mutex::new(None);
 
 impl Attempts {
@@ -121,7 +121,7 @@ impl Attempts {
         let done = panic::catch_unwind(AssertUnwindSafe(go));
         panic::set_hook(before);
         done.unwrap_or_else(|other| {
-            // One that no attempt has caught is a fault of the test.
+            // A panic that no attempt has caught is a fault of the test.
             if let Some((message, from)) = LAST.lock().ok().and_then(|mut last| last.take()) {
                 eprintln!("{message}\n{from}");
             }

@@ -1,14 +1,15 @@
-//! Hexahedra that grow outward: a cube of equal cells with layers around it, each of its sides a block of its
-//! own. A map makes a ball of it, or a half-space that is fine where something presses.
+//! Hexahedra that grow outward: a cube of equal cells with layers around it, each side of the cube a block of
+//! its own. A map turns them into a ball, or a half-space that is fine where something presses.
 
 use std::collections::BTreeMap;
 
 /// Points and hexahedra of positive volume.
 pub type Hexes = (Vec<[f64; 3]>, Vec<[u32; 8]>);
 
-/// A cube of `cells` cells from 0 to 1 along each axis, or twice as many from −1 where `whole`, in so many
-/// layers, each larger than the one within by the same factor, out to `size`. Points are in coordinates whose
-/// largest is 1 on the cube and `size` on the outer surface; `place` says where they go.
+/// Makes a cube of `cells` cells from 0 to 1 along each axis, or twice as many from −1 along `whole` axes.
+/// Around it are `layers` layers out to `size`, each larger by the same factor than the layer within. The
+/// largest coordinate of a point is 1 on the cube and `size` on the outer surface; `place` maps points to
+/// their final places.
 pub fn grown_hexes(
     cells: i32,
     layers: i32,
@@ -67,14 +68,14 @@ pub fn grown_hexes(
     (points, hexes)
 }
 
-/// A ball of a radius around the origin: `cells` cells from the centre to a cube within, and so many layers
-/// around that.
+/// Makes a ball of a radius around the origin: `cells` cells from the centre to the side of an inner cube,
+/// and `layers` layers around the cube.
 pub fn ball_of_hexes(radius: f64, cells: i32, layers: i32) -> Hexes {
     const SIZE: f64 = 2.0;
     grown_hexes(cells, layers, SIZE, [true; 3], |x| {
         let largest = x.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
         let length = x.iter().map(|x| x * x).sum::<f64>().sqrt();
-        // From a cube, that bulges, to a sphere.
+        // The shape goes from a bulging cube to a sphere.
         let round = 0.4 + 0.6 * (largest - 1.0).max(0.0) / (SIZE - 1.0);
         let scale = if largest > 0.0 { (1.0 - round) * 0.8 + round * largest / length } else { 1.0 };
         x.map(|x| x * scale * radius / SIZE)

@@ -48,8 +48,8 @@ impl Volume {
         }
     }
 
-    /// A ball of label 5 and radius 15 mm around one of label 8 and 7 mm, with a loose voxel of label 5, a
-    /// hole, and a single voxel of label 9.
+    /// A ball of label 5 and radius 15 mm around a ball of label 8 and radius 7 mm. There are also a loose
+    /// voxel of label 5, a hole, and a single voxel of label 9.
     pub fn ball_with_a_core() -> Self {
         Self::of_labels(|[x, y, z]| {
             let r = (x * x + y * y + z * z).sqrt();
@@ -71,12 +71,12 @@ impl Volume {
         Self::of_labels(|point| if ball(point) || rod(point) { label } else { 0 })
     }
 
-    /// As a NIfTI-1 file.
+    /// Returns the volume as a NIfTI-1 file.
     pub fn nifti(&self) -> Vec<u8> {
         nifti1(self, Form::Sform, false)
     }
 
-    /// As a packed NIfTI-1 file.
+    /// Returns the volume as a packed NIfTI-1 file.
     pub fn packed(&self) -> Vec<u8> {
         gzip(&self.nifti())
     }
@@ -123,7 +123,7 @@ impl Bytes {
     }
 }
 
-/// Which of the orientations a NIfTI header gets.
+/// Place of the orientation in a NIfTI header.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Form {
     /// In the affine matrix.
@@ -294,7 +294,7 @@ pub enum Syntax {
     Implicit,
     /// Little-endian, with value representations.
     Explicit,
-    /// The same, compressed.
+    /// Little-endian, with value representations, compressed.
     Deflated,
     /// Big-endian, with value representations.
     BigEndian,
@@ -405,7 +405,7 @@ pub fn dicom(volume: &Volume, k: usize, syntax: Syntax, series: &str) -> Vec<u8>
     let [along, down, _] = volume.spacing();
     let mut set = Elements::new(syntax);
     set.put(0x0008_103E, b"LO", b"a test ");
-    // A sequence with its own position, different from that of the slice.
+    // A sequence with its own position, different from the slice's.
     set.put(0x0008_1140, b"SQ", &nested(syntax));
     set.put(0x0020_000E, b"UI", series.as_bytes());
     set.decimals(0x0020_0032, &volume.slice_lps(k));
@@ -474,7 +474,7 @@ pub fn segmentation(volume: &Volume, kind: Segments, names: &[&str], syntax: Syn
     set.file()
 }
 
-/// The frames of so many segments, and the pixels of all.
+/// Frames of `segments` segments, and the pixels of all frames.
 fn frames(volume: &Volume, kind: Segments, segments: usize, syntax: Syntax) -> (Vec<Elements>, Vec<u8>) {
     let plane = volume.dims[0] * volume.dims[1];
     let segments = if kind == Segments::Labels { 0..=0 } else { 1..=segments };
@@ -545,7 +545,7 @@ fn nested(syntax: Syntax) -> Vec<u8> {
     item.bytes
 }
 
-/// A block of 24 × 12 × 12 voxels of 1 mm as 3D Slicer writes it: the left half is liver, the right one
+/// A block of 24 × 12 × 12 voxels of 1 mm as 3D Slicer writes it. The left half is liver, the right half
 /// spleen, and a tumour lies in the middle on a separate layer.
 pub fn layered_segmentation() -> Vec<u8> {
     let mut bytes =

@@ -1,7 +1,7 @@
-//! Helpers of tests: numbers at random that are the same in every run, files damaged by them and
-//! [what became of these](forging), hexahedra of simple bodies, and the memory of the process; with the
-//! features `images`, `organs`, `pieces` and `scenes` image files, label images and meshes of analytic
-//! organs, small bodies that meet, and scenes that are checked and run.
+//! Helpers of tests: reproducible random numbers, files with [random damage](forging), hexahedra of simple
+//! bodies, and the memory of the process. The feature `images` adds image files, `organs` label images and
+//! meshes of analytic organs. The feature `pieces` adds small bodies that meet, and `scenes` scenes that are
+//! checked and run.
 //!
 //! ```
 //! let mut random = pliant_testing::Random::new(1);
@@ -65,12 +65,12 @@ impl Random {
         [0; 3].map(|_| self.number())
     }
 
-    /// A whole number from 0 to below `limit`; 0 where that is 0.
+    /// A whole number from 0 to below `limit`; 0 if `limit` is 0.
     pub fn below(&mut self, limit: usize) -> usize {
         (self.next() >> 33) as usize % limit.max(1)
     }
 
-    /// The same bytes with up to four changes: cut off, cut out, filled, repeated, a bit turned.
+    /// Returns the bytes with up to four changes: cut off, cut out, filled, repeated, a bit turned.
     pub fn damaged(&mut self, seed: &[u8]) -> Vec<u8> {
         let mut bytes = seed.to_vec();
         for _ in 0..1 + self.below(4) {
@@ -119,11 +119,11 @@ body = "cube"
 nodes = { set = "z-min" }
 "#;
 
-/// Whether a test that needs a GPU, or a screen, goes on. Where there is none it prints that the test is
-/// skipped.
+/// Returns the device that a test needs, such as a GPU or a screen. Without a device it prints that the test
+/// is skipped, and returns `None`.
 ///
 /// # Panics
-/// Where there is none and `PLIANT_REQUIRE_GPU=1` requires one.
+/// If there is no device and `PLIANT_REQUIRE_GPU=1` requires one.
 #[track_caller]
 pub fn found_or_skipped<T, E: std::fmt::Display>(found: Result<T, E>) -> Option<T> {
     let missing = match found {
@@ -131,12 +131,13 @@ pub fn found_or_skipped<T, E: std::fmt::Display>(found: Result<T, E>) -> Option<
         Err(missing) => missing,
     };
     assert!(std::env::var("PLIANT_REQUIRE_GPU").as_deref() != Ok("1"), "required: {missing}");
-    // Past the capture of what passing tests print. A notice that can't be written is none.
+    // Standard error is written directly, since the output of passing tests is captured. A notice that can't
+    // be written is dropped.
     let _ = writeln!(std::io::stderr(), "skipped: {missing}");
     None
 }
 
-/// As [`found_or_skipped`], of the number of GPUs.
+/// True if there are GPUs; otherwise like [`found_or_skipped`].
 #[track_caller]
 pub fn has_gpu(adapters: usize) -> bool {
     found_or_skipped((adapters > 0).then_some(()).ok_or("no GPU was found")).is_some()

@@ -80,7 +80,7 @@ pub fn longest_edge(mesh: &Mesh) -> f64 {
     tets(mesh).flat_map(of_tet).fold(0.0, f64::max)
 }
 
-/// Points of a boundary whose faces there are more than one fan.
+/// Points of a boundary at which the faces form more than one fan.
 pub fn pinched(faces: &[Vec<u32>]) -> Vec<u32> {
     let mut others: BTreeMap<u32, Vec<[u32; 2]>> = BTreeMap::new();
     for face in faces {
@@ -88,7 +88,7 @@ pub fn pinched(faces: &[Vec<u32>]) -> Vec<u32> {
             others.entry(node).or_default().push([face[(at + 1) % 3], face[(at + 2) % 3]]);
         }
     }
-    // From the first face on to the next by the edge that both have: one fan comes back after all of them.
+    // Goes from the first face to the next across their common edge: a single fan returns after all faces.
     let is_one_fan = |links: &Vec<[u32; 2]>| {
         let (mut at, mut length) = (links[0][1], 1);
         while at != links[0][0] {
@@ -130,8 +130,8 @@ fn rotated(mut face: Vec<u32>) -> Vec<u32> {
     face
 }
 
-/// The boundary, outward, after checking that every inner face belongs to two cells that see it from opposite
-/// sides, that no face belongs to more, and that every point belongs to a cell.
+/// Returns the boundary, outward. Checks that every inner face belongs to two cells on opposite sides, no
+/// face to more, and every point to a cell.
 pub fn conforming_boundary(mesh: &Mesh) -> Vec<Vec<u32>> {
     let [block] = &mesh.blocks[..] else { panic!("one block expected") };
     let mut faces: BTreeMap<Vec<u32>, usize> = BTreeMap::new();
@@ -148,7 +148,7 @@ pub fn conforming_boundary(mesh: &Mesh) -> Vec<Vec<u32>> {
     let opposite = |face: &Vec<u32>| rotated(face.iter().rev().copied().collect());
     let boundary: Vec<_> =
         faces.keys().filter(|face| !faces.contains_key(&opposite(face))).cloned().collect();
-    // A face of three nodes that appears in two orders of its nodes would have been seen from one side twice.
+    // If three nodes appear in two orders, one side of the face occurs twice.
     let mut sorted: Vec<_> = boundary.iter().map(|face| sorted(face)).collect();
     sorted.sort();
     assert!(sorted.windows(2).all(|pair| pair[0] != pair[1]), "faces that do not meet");
@@ -161,7 +161,7 @@ fn sorted(face: &[u32]) -> Vec<u32> {
     nodes
 }
 
-/// How often each edge occurs in the faces.
+/// Number of times that each edge occurs in the faces.
 pub fn edge_counts(faces: &[Vec<u32>]) -> BTreeMap<[u32; 2], usize> {
     let mut edges = BTreeMap::new();
     for face in faces {

@@ -1,5 +1,4 @@
-//! Label images of the analytic organs as their definition gives them, and the truth to measure meshes
-//! against.
+//! Label images of the analytic organs by their definition, and the true surfaces to measure meshes against.
 
 use pliant_geometry::{CellKind, Grid, Mesh, SurfaceLocator, Vector3, boundary};
 use pliant_imaging::LabelImage;
@@ -68,8 +67,8 @@ pub fn truth(organ: &str) -> Truth {
     Truth::new(&Phantom::new(organ, 1.0).expect("a positive scale"))
 }
 
-/// Largest distance from the mesh's surface to the truth, from the truth to the mesh, and the root mean
-/// square of the first [m]; each face sampled at 15 places.
+/// Largest distances from the mesh's surface to the truth and from the truth to the mesh, and the root mean
+/// square of the first [m]. Each face is sampled at 15 places.
 pub fn distances(mesh: &Mesh, truth: &Truth) -> [f64; 3] {
     let surface = boundary(mesh);
     let (mut forth, mut squares, mut weight) = (0.0_f64, 0.0, 0.0);
@@ -103,7 +102,7 @@ pub fn interface_rms(mesh: &Mesh, label: i32, organ: Organ) -> f64 {
         (0..block.len()).filter(of_label).flat_map(|at| block.cell(at).to_vec()).collect();
     let phantom = Phantom::new(organ, 1.0).expect("a positive scale");
     let all = Stuffing::new(0.001);
-    // The ventricles do not meet: the fine mesh keeps one of them, and only its side of the middle counts.
+    // The ventricles do not meet: the fine mesh keeps one ventricle, and only its side of the middle counts.
     let fine = all.mesh(&phantom).expect("the organ is meshed").mesh;
     let surface = boundary(&fine);
     let faces: Vec<u32> = (0..surface.faces.len() as u32).collect();

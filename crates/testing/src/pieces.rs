@@ -2,7 +2,7 @@
 //! ones of Erleben (2018, TOG 37:39).
 //!
 //! A body is a block of tets whose upper side may be narrowed to a tip or an edge. Bodies that are held stand
-//! for rigid ones: a solver may put shapes of the same size in their place.
+//! for rigid bodies: a solver may replace them by rigid shapes of the same size.
 
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -11,11 +11,11 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 /// Edge [m] of most bodies.
 pub const SIZE: f64 = 0.02;
-/// Width of a tip or an edge over that of the body.
+/// Width of a tip or an edge over the width of the body.
 const SHARP: f64 = 0.04;
-/// How far [m] bodies are apart at the start.
+/// Distance [m] between bodies at the start.
 const GAP: f64 = 3e-3;
-/// Velocity [m/s] of what falls.
+/// Velocity [m/s] of falling bodies.
 const FALLS: [f64; 3] = [0.0, 0.0, -0.1];
 
 /// A block whose upper side is narrowed.
@@ -23,11 +23,11 @@ const FALLS: [f64; 3] = [0.0, 0.0, -0.1];
 pub struct Piece {
     /// Edges [m] of its lower side, and its height [m].
     pub size: [f64; 3],
-    /// Length and width of the upper side over those of the lower one.
+    /// Length and width of the upper side over length and width of the lower side.
     pub top: [f64; 2],
     /// Cells along each edge, of six tets each.
     pub cells: [u32; 3],
-    /// Where the middle of its upper side is, and how it is turned.
+    /// Position of the middle of its upper side, and rotation.
     pub at: Isometry3<f64>,
     /// Velocity [m/s] at the start; `None`: it is held, by its lower side if it is soft.
     pub velocity: Option<[f64; 3]>,
@@ -65,12 +65,12 @@ impl Piece {
         Self { top: [SHARP, 1.0], ..Self::spike(at) }
     }
 
-    /// The same, held.
+    /// Returns the piece held.
     pub fn held(self) -> Self {
         Self { velocity: None, ..self }
     }
 
-    /// The same with a velocity [m/s].
+    /// Returns the piece with a velocity [m/s].
     pub fn thrown(self, velocity: [f64; 3]) -> Self {
         Self { velocity: Some(velocity), ..self }
     }
@@ -119,7 +119,7 @@ impl Piece {
     }
 }
 
-/// What stands for a piece that is rigid, in a frame of its own.
+/// Rigid shape of a piece, in a frame of its own.
 #[derive(Clone, Copy, Debug)]
 pub enum Rigid {
     /// A box with these edges [m], centred at the origin.
@@ -129,8 +129,8 @@ pub enum Rigid {
 }
 
 impl Piece {
-    /// A rigid shape as large, and where it is: a box, a cone for a spike, and a blade as thin as the edge of
-    /// a wedge.
+    /// Returns a rigid shape as large as the piece, with its pose. It is a box, a cone for a spike, or a
+    /// blade as thin as the edge of a wedge.
     pub fn rigid(&self) -> (Rigid, Isometry3<f64>) {
         let [x, y, z] = self.size;
         let (shape, low) = match self.top {
@@ -144,17 +144,17 @@ impl Piece {
 /// Bodies that meet.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// What it shows.
+    /// Title of the scene.
     pub name: &'static str,
     /// Its bodies.
     pub pieces: Vec<Piece>,
     /// Gravity [m/s²], against z.
     pub gravity: f64,
-    /// Whether there is a floor, z ≥ 0.
+    /// True if there is a floor; bodies stay at z ≥ 0.
     pub has_floor: bool,
 }
 
-/// Plays each scene with soft bodies, and again with rigid ones in place of those that are held, if any is
+/// Plays each scene with soft bodies, and again with rigid bodies in place of the held ones, if any are held
 /// (`true`).
 ///
 /// # Panics
@@ -238,7 +238,7 @@ pub fn stacks() -> Vec<Scene> {
     ]
 }
 
-/// The ten of Erleben: spikes, wedges, holes, cracks and cliffs.
+/// The ten scenes of Erleben: spikes, wedges, holes, cracks and cliffs.
 pub fn erleben() -> Vec<Scene> {
     let scene = |name, pieces| Scene { name, pieces, gravity: 9.81, has_floor: false };
     // Blocks beside a crack or a square hole of a third of their size.

@@ -1,7 +1,7 @@
 //! A scene whose explicit steps are too long once it is pressed.
 
-/// The scene of a cube of 10 mm, pressed gently, and by 6 mm more between 3 s and another time [s]: cells
-/// invert within steps of 1 ms.
+/// Returns the scene of a cube of 10 mm. The cube is pressed gently, then by 6 mm in all between 3 s and
+/// `until` [s]. Cells invert within steps of 1 ms.
 pub fn pressed_cube(until: f64) -> String {
     format!(
         r#"[scene]

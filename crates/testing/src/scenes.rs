@@ -1,6 +1,6 @@
-//! Scenes of tests: texts and mesh files to start from, a temporary folder for them, and what a check or a
-//! run of one finds. All of it happens in this process and in the words of the libraries, so only the tests
-//! of the binary itself need the binary.
+//! Scenes of tests: texts and mesh files to start from, a temporary folder for them, and the results of
+//! checks and runs. Everything happens in this process by calls of the libraries, so only the tests of the
+//! binary itself need the binary.
 
 mod said;
 mod texts;
@@ -64,8 +64,8 @@ pub fn run_world(world: &World, folder: &Path) -> Summary {
     summary
 }
 
-/// Asserts that an error, as it is shown and as running text, has these words. The object of the run calls it
-/// one of input.
+/// Asserts that an error has these words, as shown and as running text, and that the object of the run calls
+/// it an input error.
 #[track_caller]
 pub fn assert_input_error([err, words]: [&str; 2], json: &Value, says: &[&str]) {
     for piece in says {
@@ -94,8 +94,8 @@ pub fn last_row(text: &str) -> BTreeMap<String, f64> {
     last_row_in(&out.path().join("out"))
 }
 
-/// Compares two rows: the columns whose names have a word differ by less than its limit, as a part of the
-/// largest of them in the first.
+/// Compares two rows. Columns whose names contain a word differ by less than the word's limit, relative to
+/// the largest of their values in the first row.
 #[track_caller]
 pub fn assert_rows_agree(what: &str, [one, other]: [&BTreeMap<String, f64>; 2], limits: &[(&str, f64)]) {
     for (word, limit) in limits {
@@ -114,8 +114,8 @@ pub fn last_row_in(folder: &Path) -> BTreeMap<String, f64> {
     names.zip(table.lines().last().unwrap().split(',').map(|value| value.parse().unwrap())).collect()
 }
 
-/// A run of 1 s that is cut off at 0.4 s and taken up again writes the same last row as one without a stop,
-/// and looks on the way change no bit.
+/// Checks that a run of 1 s, cut off at 0.4 s and resumed, writes the same last row as a run without a stop.
+/// Snapshots on the way change no bit.
 pub fn resumes(text: &str) {
     let whole = world(text).unwrap();
     let half = world(&text.replace("until = 1", "until = 0.4")).unwrap();
@@ -125,8 +125,8 @@ pub fn resumes(text: &str) {
     assert_eq!(a.lines().last(), b.lines().last(), "{text}");
 }
 
-/// A run that goes on from states taken at instants whose forces are found, and after steps that were
-/// stopped, ends in the same bits as one at which nobody looks.
+/// Checks that snapshots change nothing. A run continues from snapshots at instants whose forces are
+/// computed, and after steps that were stopped. It ends in the same bits as a run without snapshots.
 pub fn looks_change_nothing(world: &World) {
     let mut whole = world.simulation().unwrap();
     let steps = world.steps();
@@ -155,7 +155,7 @@ pub fn looks_change_nothing(world: &World) {
                 looked.stop_on(&stop);
             }
             assert_eq!(seen(&mut looked), first, "at t = {} s", looked.time());
-            // Only steps that take long are stopped within, and not taken then.
+            // Only long steps are interrupted; an interrupted step is not taken.
             stop.ask();
             let stopped = looked.step(1);
             stop.clear();
@@ -165,7 +165,7 @@ pub fn looks_change_nothing(world: &World) {
         }
         looked.step(1).unwrap();
     }
-    // Forces at the end bring back what lies on a device.
+    // Reading the forces at the end copies the state back from a device.
     let prints = [&mut looked, &mut whole].map(|simulation| {
         simulation.frame().unwrap();
         simulation.fingerprint()
@@ -173,7 +173,7 @@ pub fn looks_change_nothing(world: &World) {
     assert_eq!(prints[0], prints[1]);
 }
 
-/// Runs a world without a stop, and after a shorter one from its checkpoint on: that checkpoint, and the
+/// Runs a world without a stop, and from the checkpoint of a shorter run. Returns the checkpoint and the
 /// table of each.
 pub fn taken_up(whole: &World, half: &World, place: &Path) -> (Checkpoint, [String; 2]) {
     for (world, name) in [(whole, "whole"), (half, "half")] {
@@ -259,7 +259,7 @@ impl Workshop {
         (header, rows)
     }
 
-    /// The cells of a CSV file row by row; commas in quotes separate none.
+    /// The cells of a CSV file row by row; commas in quotes do not separate cells.
     pub fn cells(&self, name: &str) -> Vec<Vec<String>> {
         let cells = |line: &str| {
             let (mut all, mut quoted) = (vec![String::new()], false);
@@ -285,7 +285,7 @@ impl Workshop {
         all
     }
 
-    /// All files in a folder with their contents, except checkpoints and the page with the wall time.
+    /// Returns all files in a folder with their contents, except checkpoints and the page with the wall time.
     pub fn files(&self, folder: &str) -> Vec<(PathBuf, Vec<u8>)> {
         let folder = self.path(folder);
         let (mut all, mut open) = (Vec::new(), vec![folder.clone()]);
@@ -329,12 +329,12 @@ impl Workshop {
     }
 
     /// Runs the scene with the values of some keys set, as `pliant run` does. The outputs are in `out/case`;
-    /// those of an earlier run there are replaced.
+    /// the outputs of an earlier run there are replaced.
     pub fn run(&self, set: &[&str]) -> Told {
         self.run_into("out/case", set)
     }
 
-    /// As [`run`](Self::run), with the outputs in another folder.
+    /// Runs the scene like [`run`](Self::run), with the outputs in another folder.
     pub fn run_into(&self, out: &str, set: &[&str]) -> Told {
         self.go(None, out, set)
     }
@@ -348,7 +348,7 @@ impl Workshop {
         self.go(Some(checkpoint), out.to_str().expect("a path in UTF-8"), set)
     }
 
-    /// As [`resume`](Self::resume), with the outputs in another folder.
+    /// Resumes a run like [`resume`](Self::resume), with the outputs in another folder.
     pub fn resume_in(&self, checkpoint: &str, out: &str) -> Told {
         self.go(Some(checkpoint), out, &[])
     }
@@ -362,8 +362,8 @@ impl Workshop {
         Sweep::new(self.source()?, self.case.clone(), &set)
     }
 
-    /// Runs the scene for all combinations of some values of keys, as `pliant sweep` does; what an earlier
-    /// sweep left there is removed.
+    /// Runs the scene for all combinations of some values of keys, as `pliant sweep` does; files of an
+    /// earlier sweep there are removed.
     #[track_caller]
     pub fn sweep(&self, out: &str, set: &[&str], options: SweepOptions<'_>) -> SweepSummary {
         let sweep = self.combinations(set).unwrap_or_else(|errors| panic!("{}", errors.plain()));
@@ -385,7 +385,7 @@ impl Workshop {
         self.relative(output)
     }
 
-    /// The result of a run as an object, or the message of why there is no run.
+    /// The result of a run as an object, or the message with the reason why there is no run.
     fn attempt(
         &self,
         checkpoint: Option<&str>,
@@ -452,7 +452,7 @@ impl Workshop {
     }
 }
 
-/// What a check or a run of a scene found.
+/// Output of a check or a run of a scene.
 #[derive(Debug, Default)]
 pub struct Told {
     /// The description of a scene that was checked.
@@ -461,12 +461,12 @@ pub struct Told {
     pub err: String,
     /// The lines of the scene, and the options, in which something is underlined.
     underlined: Vec<String>,
-    /// The object that `pliant run --json` prints; none of a check without mistakes.
+    /// The object that `pliant run --json` prints; null for a check without mistakes.
     result: Value,
 }
 
 impl Told {
-    /// Adds what is shown of mistakes or warnings.
+    /// Adds the texts of mistakes or warnings that are shown.
     fn show(&mut self, errors: &SceneErrors) {
         let all = errors.diagnostics();
         if all.len() > 1 {
@@ -519,7 +519,7 @@ impl Told {
         self.err.split_whitespace().collect::<Vec<_>>().join(" ")
     }
 
-    /// Whether something is underlined in this line of the scene.
+    /// True if something is underlined in this line of the scene.
     pub fn underlines(&self, line: &str) -> bool {
         self.underlined.iter().any(|own| own.trim_end() == line)
     }

@@ -24,11 +24,11 @@ fn main() {
     measure("folded sheet with itself", with_itself(folded(), false));
 }
 
-/// How long a thing is called before it is measured, and while.
+/// Duration of the calls before the measurement, and of the measurement.
 const WARM_UP: Duration = Duration::from_millis(300);
 const MEASURED: Duration = Duration::from_secs(4);
 
-/// Calls and prints a line.
+/// Measures the calls and prints a line.
 fn measure(name: &str, mut call: impl FnMut() -> f64) {
     let start = Instant::now();
     while start.elapsed() < WARM_UP {
@@ -50,7 +50,7 @@ fn measure(name: &str, mut call: impl FnMut() -> f64) {
     println!("{name:24} {count:7} {p50:8.1} {p95:8.1} {p99:8.1} {most:8.1}  {processor:9.1} {rate:8.0}");
 }
 
-/// Processor time [s] of this thread, where Linux tells it.
+/// Processor time [s] of this thread; `None` except on Linux.
 fn processor_time() -> Option<f64> {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
     let nanoseconds: f64 = text.split_whitespace().next()?.parse().ok()?;
@@ -66,7 +66,7 @@ const PASSES: usize = 16;
 
 struct Ball {
     faces: Vec<[u32; 3]>,
-    /// Where the nodes are in each pass: they swing by 0.1 mm, a sixteenth of an edge.
+    /// Positions of the nodes in each pass: they swing by 0.1 mm, a sixteenth of an edge.
     passes: Vec<Vec<Vector3>>,
     pass: usize,
 }
@@ -96,7 +96,8 @@ impl Ball {
     }
 }
 
-/// Boxes of all triangles found anew, and the triangles near a capsule with the distance of their nodes (P1).
+/// Computes the boxes of all triangles, and finds the triangles near a capsule with the distances of their
+/// nodes (P1).
 fn refit_and_tool() -> impl FnMut() -> f64 {
     let mut ball = Ball::new();
     let around = |points: &[Vector3], face: [u32; 3]| Bounds::of(face.map(|node| points[node as usize]));
@@ -130,8 +131,8 @@ fn points_in_a_grid() -> impl FnMut() -> f64 {
     move || points.iter().map(|point| grid.near(point).distance.abs()).sum()
 }
 
-/// A sheet of 20,736 triangles with edges of 1 mm whose halves lie face to face, 0.2 mm apart, and swing: all
-/// of its nodes are near others.
+/// A sheet of 20,736 triangles with edges of 1 mm. Its halves lie face to face, 0.2 mm apart, and swing: all
+/// nodes are near others.
 fn folded() -> Ball {
     let (columns, rows) = (144, 72);
     let node = |i: u32, j: u32| j * (columns + 1) + i;
@@ -144,7 +145,7 @@ fn folded() -> Ball {
         let phase = std::f64::consts::TAU * pass as f64 / PASSES as f64;
         let place = |k: u32| {
             let [i, j] = [k % (columns + 1), k / (columns + 1)].map(f64::from);
-            // The upper half goes back over the lower one, half a cell beside its nodes.
+            // The upper half lies over the lower half, shifted by half a cell.
             let beyond = i - 0.5 * f64::from(columns);
             let x = if beyond > 0.0 { 0.5 * f64::from(columns) - beyond + 0.5 } else { i };
             let lift = if beyond > 0.0 { 2e-4 } else { 0.0 };
@@ -155,7 +156,7 @@ fn folded() -> Ball {
     Ball { faces, passes: (0..PASSES).map(swung).collect(), pass: 0 }
 }
 
-/// A surface against itself, by lists of candidates that hold, or that are made anew in each pass.
+/// Self-contact of a surface, by candidate lists that stay valid, or that are computed again in each pass.
 fn with_itself(mut surface: Ball, anew: bool) -> impl FnMut() -> f64 {
     let mut pairs = Pairs::new(&surface.surface(), None, 0.0, |node| surface.passes[0][node as usize]);
     move || {

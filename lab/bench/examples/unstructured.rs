@@ -1,7 +1,7 @@
-//! Cost of the order and the shape of a mesh: the liver in stuffed tetrahedra as meshed, with its cells
-//! shuffled, and with its nodes also shuffled, beside a cube of about as many cells. Neo-Hookean, single
-//! precision, one thread. The meshes are stepped alternately, and the fastest of two hundred short repeats
-//! counts.
+//! Cost of the order and the shape of a mesh. The liver in stuffed tetrahedra is timed as meshed, with its
+//! cells shuffled, and with its nodes also shuffled. A cube of about as many cells is timed for comparison.
+//! Neo-Hookean, single precision, one thread. The meshes are stepped alternately, and the fastest of two
+//! hundred short repeats counts.
 
 use std::error::Error;
 
@@ -27,7 +27,7 @@ fn shuffled(count: usize) -> Vec<u32> {
     order
 }
 
-/// The same mesh with its cells in another order, and its nodes too if `nodes`.
+/// Returns the mesh with its cells in another order, and its nodes too if `nodes`.
 fn in_disorder(mesh: &Mesh, nodes: bool) -> Mesh {
     let mut mesh = mesh.clone();
     if nodes {

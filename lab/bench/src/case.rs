@@ -1,8 +1,8 @@
 //! The cases: cubes of 0.1 m, each of one element, law, precision and place (threads of the CPU, or a design
 //! on a GPU).
 //!
-//! The edges 10, 16, 25 and 38 are those of thesis Fig. 6.7 (1,331 to 59,319 nodes); the larger ones extend
-//! to 10⁶ cells. All laws are compared on 21³ × 6 tets (55,566) and 30³ hexes (27,000).
+//! The edges 10, 16, 25 and 38 are from thesis Fig. 6.7 (1,331 to 59,319 nodes); the larger ones extend to
+//! 10⁶ cells. All laws are compared on 21³ × 6 tets (55,566) and 30³ hexes (27,000).
 
 use std::thread;
 
@@ -20,7 +20,7 @@ pub(crate) const EDGE: f64 = 0.1;
 
 /// Cells along the edge of the cubes of the series: first the thesis's, then up to 10⁶ cells and more.
 const SERIES: [usize; 8] = [10, 16, 25, 38, 56, 70, 100, 126];
-/// How many of them the default selection measures.
+/// Number of cubes of the series that the default selection measures.
 const THESIS: usize = 4;
 /// The most tets of a cube, and the most hexes.
 const MOST: usize = 2_100_000;
@@ -43,7 +43,7 @@ pub enum Element {
 }
 
 impl Element {
-    /// All.
+    /// Every element.
     pub const ALL: [Self; 4] = [Self::Tet4, Self::Tet4Anp, Self::Hex8, Self::Hex8Full];
 
     /// Its name in a scene file.
@@ -86,14 +86,14 @@ pub enum LawKind {
     NeoHookean,
     /// Transversely isotropic, liver-like.
     Fibres,
-    /// The first, half of its isochoric stress relaxing (one Prony term).
+    /// `NeoHookean`, with half of its isochoric stress relaxing (one Prony term).
     NeoHookeanProny,
-    /// The second, likewise.
+    /// `Fibres`, with half of its isochoric stress relaxing.
     FibresProny,
 }
 
 impl LawKind {
-    /// All.
+    /// Every law.
     pub const ALL: [Self; 4] = [Self::NeoHookean, Self::Fibres, Self::NeoHookeanProny, Self::FibresProny];
 
     /// Its name in tables.
@@ -106,12 +106,12 @@ impl LawKind {
         }
     }
 
-    /// Whether it has fibres.
+    /// True if it has fibres.
     pub fn has_fibres(self) -> bool {
         matches!(self, Self::Fibres | Self::FibresProny)
     }
 
-    /// Whether it relaxes.
+    /// True if it relaxes.
     pub fn relaxes(self) -> bool {
         matches!(self, Self::NeoHookeanProny | Self::FibresProny)
     }
@@ -150,7 +150,7 @@ impl Precision {
     }
 }
 
-/// How many threads.
+/// Number of threads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Threads {
     /// One.
@@ -169,7 +169,7 @@ impl Threads {
     }
 }
 
-/// Where a case runs.
+/// Place where a case runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// On the CPU.
@@ -189,7 +189,7 @@ pub struct Case {
     pub edge: usize,
     /// The number type.
     pub precision: Precision,
-    /// Where it runs.
+    /// Place where it runs.
     pub place: Place,
 }
 
@@ -217,12 +217,12 @@ impl Case {
         (self.edge + 1).pow(3)
     }
 
-    /// Whether it runs on a GPU.
+    /// True if it runs on a GPU.
     pub fn is_on_device(&self) -> bool {
         matches!(self.place, Place::Device(_))
     }
 
-    /// Whether the default selection contains it: all laws on one mesh per element, and the thesis's series,
+    /// True if the default selection contains it: all laws on one mesh per element, and the thesis's series,
     /// on the CPU.
     pub fn is_default(&self) -> bool {
         let [simplest, richest] = [LawKind::NeoHookean, LawKind::FibresProny].map(|law| self.law == law);
@@ -237,7 +237,7 @@ impl Case {
         }
     }
 
-    /// Whether it belongs to the series of meshes, among its first `count`.
+    /// True if it belongs to the first `count` of the series of meshes.
     fn in_series(&self, count: usize) -> bool {
         matches!(self.element, Element::Tet4 | Element::Hex8)
             && self.cells() <= MOST
@@ -260,15 +260,15 @@ impl Case {
     }
 }
 
-/// All cases, ordered by element, law, precision and place.
+/// Returns all cases, ordered by element, law, precision and place.
 pub fn cases() -> Vec<Case> {
     let mut cases = on_processor();
     cases.extend(on_device());
     cases
 }
 
-/// All designs on the mesh on which laws are compared, and for the simplest and the richest law on large
-/// ones.
+/// Cases on a GPU: all designs with the simplest and the richest law, on the mesh on which laws are compared
+/// and on large meshes.
 fn on_device() -> impl Iterator<Item = Case> {
     let kinds = Element::ALL.into_iter().flat_map(|element| {
         [LawKind::NeoHookean, LawKind::FibresProny].into_iter().map(move |law| (element, law))

@@ -1,4 +1,4 @@
-//! Steps against the clock.
+//! Timing of steps.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -10,10 +10,10 @@ use pliant_mechanics::model::Contradiction;
 
 /// A model that can be timed.
 pub trait Timed {
-    /// Why a step can fail.
+    /// Error of a step.
     type Error;
 
-    /// The warm-up steps until a batch takes a quarter of this time [s].
+    /// Duration of the warm-up [s]: steps are taken until a batch takes a quarter of this time.
     const WARM_UP: f64;
 
     /// Takes some steps, at least one; returns the wall time of one [s].
@@ -35,7 +35,7 @@ pub trait Timed {
             if each * steps as f64 >= 0.25 * seconds {
                 return Ok((enough as usize).max(1));
             }
-            // Towards the quarter in at most four times the steps: the first ones are slow.
+            // Steps grow towards the quarter by at most a factor of four, since the first steps are slow.
             steps = (0.3 * enough).min(4.0 * steps as f64).ceil() as usize;
         }
     }
@@ -56,7 +56,7 @@ impl<R: Scalar> Clocked<R> {
         Ok(Self { stepper: CentralDifference::new(model, step)?.dissipating(), state })
     }
 
-    /// With the lanes of given instructions instead of the widest.
+    /// Uses the lanes of given instructions instead of the widest.
     ///
     /// # Errors
     /// If the CPU does not have them.
@@ -65,7 +65,7 @@ impl<R: Scalar> Clocked<R> {
     }
 }
 
-/// On the current rayon pool.
+/// Steps run on the current rayon pool.
 impl<R: Scalar> Timed for Clocked<R> {
     type Error = StepError;
     const WARM_UP: f64 = 0.0;
@@ -132,7 +132,7 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// Of some values.
+    /// Returns the spread of some values.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
         let mut values: Vec<f64> = values.into_iter().collect();
         values.sort_unstable_by(f64::total_cmp);

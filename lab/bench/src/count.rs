@@ -1,8 +1,7 @@
 //! Bytes and floating-point operations of a step on the CPU, counted by hand from the formulas.
 //!
-//! Left out: GPUs. Each design has arrays and passes of its own for every element, `blocks` finds cells at
-//! the borders of blocks several times, and `fast` finds shapes at rest again. These counts say nothing about
-//! them.
+//! The counts do not hold for GPUs. There each design has arrays and passes of its own for every element.
+//! `blocks` computes cells at the borders of blocks several times, and `fast` computes shapes at rest again.
 //!
 //! **Operations**: every +, −, × and ÷ on real numbers in the formulas of `law/`, `forces/` and the node pass
 //! of `node_pass.rs`; a multiply-add is two. Not counted: index arithmetic, comparisons, and repeated
@@ -13,27 +12,32 @@
 //! | u_a − u_0 | 3 (N−1) | |
 //! | H = Σ u_a ⊗ B_a | 18 (N−1) | 9 multiply-adds a node |
 //! | J − 1 = tr H + II(H) + det H | 29 | 2 + 11 + 14 + 2 |
-//! | F, C − I, I − C⁻¹, C⁻¹, J, q | 95 + root | 3 + 42 + 39 (cofactors of C − I 18, sums 15, over J² 6) + 3 + 8; the root is J^(−1/3) by steps of third order, 9 operations each: 18 in single, 27 in double precision |
+//! | F, C − I, I − C⁻¹, C⁻¹, J, q | 95 + root | 3 + 42 + 39 (cofactors 18, sums 15, over J² 6) + 3 + 8 |
 //! | extremes of deformation | 12 | \|C − I\|² |
 //! | isochoric stress NH | 14 | 2 W₁ q and its mean 5, times I − C⁻¹ 6, mean 3 |
-//! | fibre stress TI, beyond NH | 52 | q − 1 7, strain of the fibre 23, its part of the mean 4, a⊗a 6 and its multiple 12 |
+//! | fibre stress TI, beyond NH | 52 | q − 1 7, fibre strain 23, part of mean 4, a⊗a 6, multiple 12 |
 //! | one Prony term | 36 | change 6, what remains 6, d h + g ΔΦ 18, sum 6 |
-//! | volumetric stress | 14 | κ J (J − 1) 2, times C⁻¹ 6, sum 6; of an averaged pressure 45: cof F 27, times p and sum 18 |
+//! | volumetric stress | 14 | κ J (J − 1) 2, times C⁻¹ 6, sum 6 |
+//! | volumetric stress of an averaged pressure | 45 | cof F 27, times p and sum 18 |
 //! | P = F S | 45 | |
 //! | V P, f_a = V P B_a, f_0 = −Σ f_a | 9 + 15 (N−1) + 3 (N−2) | |
-//! | hourglass control (`hex8`) | 295 | Σ Γ u 48, less H Y 72, energy 26, k q 12, taken from V P 72, Σ Γ k q 60; whether a corner may be inverted 5 |
+//! | hourglass control (`hex8`) | 295 | Σ Γ u 48, less H Y 72, energy 26, k q 12, V P 72, Σ Γ k q 60, 5 |
 //! | sums of blocks | 3 N | |
 //! | a node's step | 79 | per component 24, of which 12 are energies; 7 once |
+//!
+//! The cofactors belong to C − I. The root is J^(−1/3) by steps of third order, 9 operations each: 18 in
+//! single, 27 in double precision. Hourglass control changes V P (72), and tests for corners that may be
+//! inverted (5).
 //!
 //! `tet4-anp` computes J in a separate pass and averages it (6 + 4 per cell, 1 per node); `hex8-full`
 //! computes J and the stress at eight points, where f_a = Σ w P B_a takes 18 (N−1) per point.
 //!
 //! **Bytes**: memory traffic of a step if all intermediate data stay in the caches: a lower bound for any
-//! layout. Read: node numbers (2 bytes each), gradients of all nodes but the first and volume (3 N − 2
-//! numbers), the fibre (3), hourglass moments, stiffness and reach (14). Read and written: the history (Φ and
-//! h, 6 numbers each), and for a node displacement and increment (12 numbers); mass and damping (2) are read.
-//! `tet4-anp` reads its cells twice. Not counted: the copies of a block and its sums, each four numbers per
-//! node of a block.
+//! layout. A cell reads its node numbers (2 bytes each), the gradients of all nodes but the first and the
+//! volume (3 N − 2 numbers). It also reads the fibre (3), and the hourglass moments, stiffness and reach
+//! (14). It reads and writes its history (Φ and h, 6 numbers each). A node reads and writes displacement and
+//! increment (12 numbers), and reads mass and damping (2). `tet4-anp` reads its cells twice. Not counted: the
+//! copies of a block and its sums, each four numbers per node of a block.
 
 use crate::case::{Case, Element, LawKind, Precision};
 
@@ -46,7 +50,7 @@ pub struct Count {
     pub flops: f64,
 }
 
-/// Of one element with any law.
+/// Operations and numbers of one element with any law.
 struct OfElement {
     /// Points at which the law is evaluated.
     points: f64,
@@ -56,7 +60,7 @@ struct OfElement {
     indices: f64,
     /// Numbers read and written per node.
     node_numbers: f64,
-    /// Operations per cell except those at the points.
+    /// Operations per cell except at the points.
     flops: f64,
     /// Operations per point except the cube root and the isochoric stress.
     point_flops: f64,
@@ -64,7 +68,7 @@ struct OfElement {
     node_flops: f64,
 }
 
-/// Of one law at a point.
+/// Operations and numbers of one law at a point.
 struct OfLaw {
     /// Fibre directions of a cell [numbers].
     fibre: f64,
@@ -84,7 +88,7 @@ const fn gradient(nodes: f64) -> f64 {
     21.0 * (nodes - 1.0)
 }
 
-/// f_a, and the blocks' sums of them.
+/// f_a, and the blocks' sums of f_a.
 const fn forces(nodes: f64) -> f64 {
     9.0 + 15.0 * (nodes - 1.0) + 3.0 * (nodes - 2.0) + 3.0 * nodes
 }
@@ -98,9 +102,9 @@ const fn rest(nodes: f64) -> f64 {
 const VOLUME_CHANGE: f64 = 29.0;
 /// The measures of a deformation from H except the cube root, its extremes, and P.
 const POINT: f64 = VOLUME_CHANGE + 95.0 + 12.0 + 45.0;
-/// Of the law's own pressure.
+/// Volumetric stress by the law's own pressure.
 const VOLUMETRIC: f64 = 14.0;
-/// Of an averaged pressure.
+/// Volumetric stress by an averaged pressure.
 const AVERAGED: f64 = 45.0;
 const HOURGLASS: f64 = 295.0;
 
@@ -136,7 +140,7 @@ const fn of_element(element: Element) -> OfElement {
         },
         Element::Hex8Full => OfElement {
             points: 8.0,
-            // Those of eight points, and the volume.
+            // Gradients and volumes of eight points, and the volume.
             constants: 8.0 * rest(8.0) + 1.0,
             indices: 8.0,
             node_numbers: NODE_NUMBERS,
@@ -160,7 +164,7 @@ const fn of_law(law: LawKind) -> OfLaw {
 }
 
 impl Count {
-    /// Of a case on the CPU.
+    /// Returns the count of a case on the CPU.
     pub fn of(case: &Case) -> Self {
         let (element, law) = (of_element(case.element), of_law(case.law));
         let nodes_per_cell = case.nodes() as f64 / case.cells() as f64;
@@ -186,7 +190,7 @@ mod tests {
     use super::*;
     use crate::{cases, find};
 
-    /// Of the cells alone, without their share of the nodes.
+    /// Bytes and operations of the cells alone, without their share of the nodes.
     fn cells_only(id: &str) -> [f64; 2] {
         let case = find(id).unwrap();
         let (count, nodes) = (Count::of(&case), case.nodes() as f64 / case.cells() as f64);

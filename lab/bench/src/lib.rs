@@ -1,9 +1,9 @@
-//! Cost of a step on this machine. [`Case`]s (a cube of one element, law, precision and number of threads)
-//! are timed and compared with the limits of the machine ([`Rates`]) and the operations of a step
-//! ([`Count`]). The specimens also serve tests elsewhere.
+//! Cost of a step on this machine. A [`Case`] is a cube of one element, law, precision and number of threads.
+//! Its time is compared with the limits of the machine ([`Rates`]) and the operations of a step ([`Count`]).
+//! Tests elsewhere also use the specimens.
 //!
 //! Whole steps are measured through the public interface of `pliant-mechanics`, `evaluate` and `advance`.
-//! Leaves out: monitoring of the critical time step, observers and files, which a run also has.
+//! Monitoring of the critical time step, observers and files, which a run also has, are left out.
 
 mod case;
 mod clock;

@@ -32,7 +32,7 @@ pub struct Rates {
     pub copy: f64,
     /// Operations in multiply-adds [1/s], single precision.
     pub single: f64,
-    /// The same, double precision.
+    /// Operations in multiply-adds [1/s], double precision.
     pub double: f64,
 }
 

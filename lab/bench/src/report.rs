@@ -46,9 +46,9 @@ pub struct Row {
     pub lanes: Option<&'static str>,
     /// Wall time of a step per element [ns], the median of the repeats.
     pub ns_per_element_step: f64,
-    /// The same of the fastest repeat.
+    /// Wall time of a step per element [ns] in the fastest repeat.
     pub ns_least: f64,
-    /// The same of the slowest repeat.
+    /// Wall time of a step per element [ns] in the slowest repeat.
     pub ns_most: f64,
     /// Elements stepped in a second.
     pub elements_per_second: f64,
@@ -62,7 +62,7 @@ pub struct Row {
     pub flop_fraction: Option<f64>,
     /// The step [s] that a run would take: 0.9 × the limit at rest.
     pub critical_step: f64,
-    /// The limit: that of the assembled model, or for large meshes the element bound.
+    /// The limit: the assembled model's, or for large meshes the element bound.
     pub critical_step_from: Limit,
     /// The critical step over the wall time of a step.
     pub real_time_factor: f64,
@@ -80,13 +80,13 @@ pub(crate) struct Measured {
     pub threads: Option<usize>,
     pub design: String,
     pub lanes: Option<Instructions>,
-    /// Bytes read and written in copying [1/s] and operations in multiply-adds [1/s], if those of a step are
-    /// counted.
+    /// Bytes read and written in copying [1/s] and operations in multiply-adds [1/s], if the bytes and
+    /// operations of a step are counted.
     pub peaks: Option<[f64; 2]>,
 }
 
 impl Row {
-    /// From the wall times of a step [s] and the step [s] with the limit it is taken from.
+    /// Makes a row from the wall times of a step [s], and the step [s] with the source of its limit.
     pub(crate) fn new(
         case: Case,
         place: Measured,
@@ -131,7 +131,7 @@ impl Row {
     }
 }
 
-/// T = b N over the meshes of a series: the cost of an element if it is the same in all of them.
+/// T = b N over the meshes of a series: the cost of an element if it is the same in all meshes.
 #[derive(Clone, Debug)]
 pub struct Fit {
     /// One of the cases.
@@ -164,11 +164,11 @@ impl Fit {
         fits
     }
 
-    /// `None` of fewer than three meshes.
+    /// Fits a series; `None` for fewer than three meshes.
     fn of(rows: &[&Row]) -> Option<Self> {
         let (first, last) =
             (rows.iter().min_by_key(|row| row.cells)?, rows.iter().max_by_key(|row| row.cells)?);
-        // Of r = N/T, b = Σ r / Σ r².
+        // With r = N/T, b = Σ r / Σ r².
         let rates = rows.iter().map(|row| 1.0 / row.ns_per_element_step);
         let b = rates.clone().sum::<f64>() / rates.map(|r| r * r).sum::<f64>();
         let deviation = |row: &Row| (row.ns_per_element_step / b - 1.0).abs();
@@ -184,7 +184,7 @@ impl Fit {
         })
     }
 
-    /// Whether a case belongs to the series.
+    /// True if a case belongs to the series.
     pub(crate) fn covers(&self, case: &Case) -> bool {
         same_series(&self.case, case)
     }
@@ -252,16 +252,16 @@ impl OnDevice {
 pub struct Refused {
     /// The case.
     pub id: String,
-    /// Why.
+    /// Reason.
     pub reason: String,
 }
 
-/// All measurements.
+/// Results of all measurements.
 #[derive(Clone, Debug)]
 pub struct Report {
     /// The machine.
     pub machine: Machine,
-    /// How it was measured.
+    /// Settings of the measurement.
     pub settings: Settings,
     /// Peak rates of the machine, for each number of threads.
     pub rates: Vec<Rates>,
@@ -269,7 +269,7 @@ pub struct Report {
     pub device: Option<OnDevice>,
     /// The cases.
     pub rows: Vec<Row>,
-    /// Cases that were too large for it.
+    /// Cases that were too large for the GPU.
     pub refused: Vec<Refused>,
     /// Linear cost of the series.
     pub fits: Vec<Fit>,
@@ -278,7 +278,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// As one JSON object.
+    /// Returns the report as one JSON object.
     pub fn json(&self) -> Value {
         json!({
             "version": env!("CARGO_PKG_VERSION"),
@@ -294,7 +294,7 @@ impl Report {
         })
     }
 
-    /// As aligned tables in Markdown.
+    /// Returns the report as aligned tables in Markdown.
     pub fn table(&self) -> String {
         let Machine { processor, cores, system } = &self.machine;
         let mut parts = vec![

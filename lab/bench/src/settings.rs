@@ -1,8 +1,8 @@
-//! How to measure.
+//! Settings of measurements.
 
 use pliant_explicit::Instructions;
 
-/// How to measure.
+/// Settings of measurements.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
     /// Repeats that count, at least one.

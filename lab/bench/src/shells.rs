@@ -1,5 +1,5 @@
-//! Implicit steps of shells: a tube like a bowel (radius 20 mm, length 200 mm, wall 2 mm, E = 0.1 MPa, ν =
-//! 0.45, both ends fixed) under a pressure that pulses between 0 and 1 kPa twice a second, in steps of 40 ms
+//! Implicit steps of shells. The body is a tube like a bowel (radius 20 mm, length 200 mm, wall 2 mm, E = 0.1
+//! MPa, ν = 0.45, both ends fixed). Its pressure pulses between 0 and 1 kPa twice a second, in steps of 40 ms
 //! with one linear solution each. Conjugate gradients run to a residual of 0.1 % on the CPU, and on the best
 //! GPU.
 
@@ -28,7 +28,7 @@ use crate::{Machine, Spread as Times};
 pub const SHELL_STEP: f64 = 0.04;
 /// Residual over the loads at which conjugate gradients stop.
 const TOLERANCE: f64 = 1e-3;
-/// Shells of each tube, and steps measured of it.
+/// Number of shells of each tube, and number of measured steps.
 const TUBES: [(usize, usize); 4] = [(800, 50), (4000, 40), (20_000, 20), (50_000, 10)];
 /// Steps before those that count: drivers compile kernels in the first one.
 const WARM_UP: usize = 3;
@@ -73,20 +73,20 @@ pub fn tube(shells: usize) -> Result<Assembly, ModelError> {
     Ok(model)
 }
 
-/// What steps of a tube took.
+/// Cost of the steps of a tube.
 #[derive(Clone, Debug)]
 pub struct ShellRun {
     /// Shells.
     pub shells: usize,
     /// Wall times of a step [s].
     pub time: Times,
-    /// Wall time of all its parts, in all steps.
+    /// Wall times of the parts of all steps.
     pub phases: Phases,
     /// Steps.
     pub steps: usize,
     /// The largest residual over the loads.
     pub residual: f64,
-    /// Where it ended.
+    /// State at the end.
     pub last: State,
 }
 
@@ -119,7 +119,7 @@ impl ShellRun {
         Ok(Self { shells: model.facets.len(), time, phases, steps, residual, last: state })
     }
 
-    /// Mean [ms] of a step of a time of all.
+    /// Mean time per step [ms], from the time of all steps.
     fn mean(&self, all: Duration) -> f64 {
         1e3 * all.as_secs_f64() / self.steps as f64
     }
@@ -141,8 +141,8 @@ fn real_time(preconditioner: Preconditioner) -> DynamicSettings {
     DynamicSettings::new(SHELL_STEP).real_time(linear)
 }
 
-/// Measures tubes of 800 to 50,000 shells, on a GPU, too, where there is one; on one that is software up to
-/// 4,000.
+/// Measures tubes of 800 to 50,000 shells, also on a GPU if there is one. On a software GPU it measures up to
+/// 4,000 shells.
 ///
 /// # Errors
 /// If the GPU or a step fails.

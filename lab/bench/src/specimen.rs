@@ -35,7 +35,7 @@ pub enum Hexes {
 pub struct Specimen {
     /// Its mesh.
     pub mesh: Mesh,
-    /// The model of it.
+    /// Its model.
     pub model: Model,
 }
 
@@ -46,8 +46,7 @@ impl Specimen {
         Self::of_elements(mesh, Tets::Plain, Hexes::UniformStrain(HOURGLASS), material, fibre)
     }
 
-    /// The volume cells of a mesh as certain elements, filled by their fractions where they are immersed
-    /// cubes.
+    /// The volume cells of a mesh as given elements. Immersed cubes are filled by their fractions.
     pub fn of_elements(
         mesh: Mesh,
         tets: Tets,
@@ -126,34 +125,34 @@ impl Specimen {
         plane.nodes(&self.mesh, &boundary(&self.mesh)).unwrap_or_else(|error| panic!("{error}"))
     }
 
-    /// With mass-proportional damping α [1/s].
+    /// Adds mass-proportional damping α [1/s].
     #[must_use]
     pub fn damped(mut self, alpha: f64) -> Self {
         self.model.bodies[0].damping = alpha;
         self
     }
 
-    /// With the marked components of a face held: the constraint `fix x-min` and so on.
+    /// Holds the marked components of a face: the constraint `fix x-min` and so on.
     #[must_use]
     pub fn fix(self, face: &str, components: [bool; 3]) -> Self {
         self.constrain("fix", face, components, Motion::Fixed)
     }
 
-    /// With x held on `x-min`, y on `y-min` and z on `z-min`: an eighth of a symmetric body, or a block that
-    /// may change its width.
+    /// Holds x on `x-min`, y on `y-min` and z on `z-min`. This makes an eighth of a symmetric body, or a
+    /// block that may change its width.
     #[must_use]
     pub fn on_rollers(self) -> Self {
         let [x, y, z] = [0, 1, 2].map(|axis| [0, 1, 2].map(|c| c == axis));
         self.fix("x-min", x).fix("y-min", y).fix("z-min", z)
     }
 
-    /// With a face displaced along x: the constraint `move x-max` and so on.
+    /// Displaces a face along x: the constraint `move x-max` and so on.
     #[must_use]
     pub fn shift(self, face: &str, along_x: f64, curve: Curve) -> Self {
         self.constrain("move", face, [true, false, false], Motion::Displacement([along_x, 0.0, 0.0], curve))
     }
 
-    /// With a face displaced as a whole: the constraint `move x-max` and so on.
+    /// Displaces a face as a whole: the constraint `move x-max` and so on.
     #[must_use]
     pub fn carry(self, face: &str, by: Vector<f64>, curve: Curve) -> Self {
         self.constrain("move", face, [true; 3], Motion::Displacement(by, curve))
@@ -166,14 +165,14 @@ impl Specimen {
         self
     }
 
-    /// Under gravity [m/s²] from the start.
+    /// Adds gravity [m/s²] from the start.
     #[must_use]
     pub fn falling(self, acceleration: Vector<f64>) -> Self {
         let curve = Curve { shape: Shape::Hold, from: 0.0, to: 1.0 };
         self.loaded(LoadKind::Gravity { body: 0, acceleration }, curve)
     }
 
-    /// Under a load.
+    /// Adds a load.
     #[must_use]
     pub fn loaded(mut self, kind: LoadKind, curve: Curve) -> Self {
         self.model.loads.push(Load::new("load", kind, curve));
@@ -217,7 +216,7 @@ impl Specimen {
 
 /// The mesh of [`Specimen::block`].
 pub(crate) fn block(size: [f64; 3], counts: [usize; 3], cells: VolumeCell) -> Mesh {
-    // Cases choose their own sizes: cubes for GPUs have more cells than a user's mesh may have unasked.
+    // Cases choose their own sizes: cubes for GPUs have more cells than the default limit for a user's mesh.
     let mesh = Block::new(size).mesh(Resolution::Counts(counts), cells, usize::MAX);
     mesh.unwrap_or_else(|error| panic!("{error}"))
 }

@@ -1,8 +1,8 @@
 //! Measuring cases one after another.
 //!
 //! Each cube is fixed at `x-min` and starts compressed and sheared uniformly, with `x-max` fixed in its
-//! displaced position: all cells are deformed from the first step and keep vibrating. After a warm-up, each
-//! repeat takes enough steps for [`Settings::seconds`].
+//! displaced position. All cells are thus deformed from the first step, and keep vibrating. After a warm-up,
+//! each repeat takes enough steps for [`Settings::seconds`].
 
 use std::sync::Arc;
 
@@ -20,10 +20,10 @@ use crate::report::{Cube, Fit, Limit, Measured, OnDevice, Refused, Report, Row};
 use crate::settings::Settings;
 use crate::{Machine, Rates, Specimen};
 
-/// Displacement of `x-max` [m]; a node at x has x/[`EDGE`] of it.
+/// Displacement of `x-max` [m]; a node at x has the part x/[`EDGE`].
 const SQUEEZE: [f64; 3] = [-0.02 * EDGE, 0.01 * EDGE, 0.005 * EDGE];
-/// Up to this many cells the critical time step of the assembled model is computed, which costs as much as
-/// some 100 steps in double precision. For a cube in real time it is always computed.
+/// Largest number of cells for which the critical time step of the assembled model is computed. It costs as
+/// much as some 100 steps in double precision. For a cube in real time it is always computed.
 const CELLS_OF_ASSEMBLED: usize = 100_000;
 /// Fraction of the limit that a run takes as its step: the critical step of a row.
 const PART_OF_LIMIT: f64 = 0.9;
@@ -48,7 +48,7 @@ pub enum BenchError {
     Step {
         /// The case.
         id: String,
-        /// Why.
+        /// Reason.
         source: StepError,
     },
     /// Constraints contradict each other.
@@ -66,7 +66,7 @@ pub enum BenchError {
     /// No device, or it failed.
     #[error("{source}; {}", source.remedy())]
     Device {
-        /// Why.
+        /// Reason.
         #[from]
         source: GpuError,
     },
@@ -110,16 +110,16 @@ pub fn measure(
     Ok(Report { machine: bench.machine, settings, rates, device, rows, refused, fits, cubes })
 }
 
-/// The cube of n³ grid cells whose step is predicted to take as long as it simulates: with T = b k n³ for k
-/// cells in a grid cell and Δt = d/n, n⁴ = d/(b k). Computed for the tissues of thesis Fig. 6.7 on all
+/// The cube of n³ grid cells whose step is predicted to take as long as it simulates. T = b k n³ for k cells
+/// in a grid cell, and Δt = d/n, give n⁴ = d/(b k). Computed for the tissues of thesis Fig. 6.7 on all
 /// threads.
 fn largest_in_real_time(fit: &Fit, rows: &[Row]) -> Option<Case> {
     let thesis = matches!(fit.case.element, Element::Tet4 | Element::Hex8)
         && matches!(fit.case.law, LawKind::NeoHookean | LawKind::FibresProny)
         && fit.case.precision == Precision::Single
         && fit.case.place != Place::Processor(Threads::One);
-    // From the finest mesh with a known critical time step of the assembled model; otherwise from
-    // the finest mesh.
+    // Extrapolates from the finest mesh with a known critical time step of the assembled model, else from the
+    // finest mesh.
     let known = rows.iter().filter(|row| fit.covers(&row.case));
     let finest = known.max_by_key(|row| (row.critical_step_from == Limit::True, row.cells))?;
     let d = finest.critical_step * finest.case.edge as f64;
@@ -232,13 +232,13 @@ impl Bench {
     }
 }
 
-/// With `x-min` fixed and `x-max` displaced by [`SQUEEZE`].
+/// Fixes `x-min` and displaces `x-max` by [`SQUEEZE`].
 fn squeezed(specimen: Specimen) -> Specimen {
     let hold = Curve { shape: Shape::Hold, from: 0.0, to: 1.0 };
     specimen.fix("x-min", [true; 3]).carry("x-max", SQUEEZE, hold)
 }
 
-/// Every cell deformed equally.
+/// State in which every cell is deformed equally.
 fn start<R: Scalar>(model: &Model) -> State<R> {
     let displacement = model.rest.iter().map(|x| SQUEEZE.map(|by| R::of(by * x[0] / EDGE))).collect();
     State { displacement, ..State::at_rest(model) }

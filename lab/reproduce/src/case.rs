@@ -22,7 +22,7 @@ pub struct Case {
     pub corrections: &'static [Correction],
     /// Approximate time on two cores [s].
     pub seconds: f64,
-    /// Computes it.
+    /// Function that computes it.
     pub(crate) compute: fn() -> Result<Findings, CaseError>,
 }
 
@@ -55,7 +55,7 @@ pub struct Figure {
     pub caption: String,
 }
 
-/// A number beside its reference.
+/// A number and its reference.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
     /// Its case.
@@ -70,11 +70,11 @@ pub struct Row {
     pub computed: Option<f64>,
     /// The tolerance, in the unit of the row.
     pub tolerance: Option<f64>,
-    /// Whether it is within the tolerance; `None` without one.
+    /// True if it is within the tolerance; `None` without one.
     pub pass: Option<bool>,
     /// The source of the reference.
     pub source: &'static str,
-    /// Whether the number depends on the machine.
+    /// True if the number depends on the machine.
     #[serde(skip)]
     pub machine: bool,
 }
@@ -127,7 +127,7 @@ impl Row {
         }
     }
 
-    /// A measurement of this machine, beside one of another machine; not judged.
+    /// A measurement of this machine, with a measurement of another machine for comparison; not judged.
     pub(crate) fn timed(
         quantity: impl Into<String>,
         unit: &'static str,

@@ -18,7 +18,7 @@ impl Report {
     }
 }
 
-/// Whether a report writes a file of this name.
+/// True if a report writes a file of this name.
 pub fn is_own_file(name: &str) -> bool {
     FILES.contains(&name)
 }
@@ -71,7 +71,7 @@ fn page(report: &Report) -> String {
     )
 }
 
-/// How many of a case's judged rows passed.
+/// Number of a case's judged rows that passed, in words.
 fn tally(findings: &Findings) -> String {
     let count = |pass| findings.rows.iter().filter(|row| row.pass == Some(pass)).count();
     match [count(true), count(false)] {

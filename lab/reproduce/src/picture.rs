@@ -1,6 +1,6 @@
-//! Pictures of deformed bodies, drawn by the renderer of `pliant render`: several bodies in one SVG with a
-//! common view, the shape at rest as a ghost, a colour bar. Without the feature `viewer` or an adapter, the
-//! page explains their absence.
+//! Pictures of deformed bodies, drawn by the renderer of `pliant render`. One SVG shows several bodies in a
+//! common view, the shape at rest as a ghost, and a colour bar. Without the feature `viewer` or an adapter,
+//! the page explains their absence.
 
 use pliant_geometry::Mesh;
 use pliant_mechanics::tensor::Vector;
@@ -15,11 +15,11 @@ pub(crate) struct Body<'a> {
     pub label: String,
     pub mesh: &'a Mesh,
     pub displacement: Vec<Vector<f64>>,
-    /// The quantity shown by colour, at the nodes; without it the colour is that of tissue.
+    /// The quantity shown by colour, at the nodes; without it the body has the colour of tissue.
     pub value: Option<Vec<f64>>,
-    /// Whether the edges of the faces are drawn.
+    /// True to draw the edges of the faces.
     pub edges: bool,
-    /// Whether it has the texture of moist tissue.
+    /// True if it has the texture of moist tissue.
     pub skin: bool,
 }
 

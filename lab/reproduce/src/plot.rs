@@ -16,7 +16,7 @@ const FINE: i32 = 8;
 /// Size of a plot. Two fit side by side on a page, and one above the other on a telephone.
 const SIZE: (u32, u32) = (560 * FINE as u32, 420 * FINE as u32);
 const FONT: (&str, i32) = ("sans-serif", 16 * FINE);
-/// Colours that colour-blind eyes tell apart (Okabe and Ito 2008).
+/// Colours that colour-blind eyes can distinguish (Okabe and Ito 2008).
 const COLOURS: [RGBColor; 6] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -26,7 +26,7 @@ const COLOURS: [RGBColor; 6] = [
     RGBColor(86, 180, 233),
 ];
 
-/// How a curve is drawn.
+/// Style in which a curve is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Pen {
     Line,
@@ -34,10 +34,10 @@ pub(crate) enum Pen {
     Markers,
 }
 
-/// A curve. Those of one colour belong together.
+/// A curve. Curves of one colour belong together.
 #[derive(Clone, Debug)]
 pub(crate) struct Curve {
-    /// Its name in the key; one without a name is not in it.
+    /// Its name in the key; a curve without a name is not in the key.
     pub name: String,
     pub colour: usize,
     pub pen: Pen,
@@ -201,7 +201,7 @@ pub(crate) fn bars(
     Ok(Figure { svg: Some(svg), caption: caption.into() })
 }
 
-/// A number on an axis, without digits that say nothing.
+/// A number on an axis, without superfluous digits.
 fn label(value: &f64) -> String {
     if *value == 0.0 {
         return "0".into();

@@ -17,7 +17,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// Computes cases one after another. `starting` hears of each before it is computed.
+    /// Computes cases one after another. `starting` is called with each case before it is computed.
     pub fn new(cases: &[&'static Case], mut starting: impl FnMut(&'static Case)) -> Self {
         let mut done = Vec::new();
         for &case in cases {
@@ -28,12 +28,12 @@ impl Report {
         Self { cases: done, machine: Machine::this(), date: time::OffsetDateTime::now_utc().date() }
     }
 
-    /// All rows.
+    /// Returns all rows.
     pub fn rows(&self) -> impl Iterator<Item = &Row> {
         self.cases.iter().flat_map(|(_, findings, _)| &findings.rows)
     }
 
-    /// How many rows passed and how many failed; the others are not judged.
+    /// Number of rows that passed and number that failed; the others are not judged.
     pub fn counts(&self) -> [usize; 2] {
         [true, false].map(|pass| self.rows().filter(|row| row.pass == Some(pass)).count())
     }
@@ -100,7 +100,7 @@ impl Row {
     }
 }
 
-/// Yes, no, or nothing to judge by.
+/// Verdict in words: yes, no, or not judged.
 pub(crate) fn verdict(pass: Option<bool>) -> &'static str {
     match pass {
         Some(true) => "pass",

@@ -12,7 +12,7 @@ use crate::CaseError;
 /// The name of the only participant.
 const NAME: &str = "model";
 
-/// Steps a model from rest to a time [s] by central differences of a given length [s], which nothing cuts.
+/// Steps a model from rest to a time [s] by central differences of a given length [s], which is never cut.
 /// `look` sees every instant, both ends included.
 ///
 /// # Errors
@@ -29,7 +29,7 @@ pub fn run(
         settings.precision = precision;
         settings.critical_step = f64::INFINITY;
     }
-    // A time that is a whole number of steps but for round-off takes no step more.
+    // A time that is a whole number of steps except for round-off takes no further step.
     part.steps = Steps { step, number: (until / step - 1e-9).ceil() as u64, ends: None };
     let end = part.steps.end_of(part.steps.number);
     let mut simulation = Simulation::new(World::new(vec![part]))?;
@@ -41,7 +41,7 @@ pub fn run(
 pub struct Equilibrium {
     /// Nodal displacements [m].
     pub displacement: Vec<Vector<f64>>,
-    /// The largest of them [m].
+    /// The largest displacement [m].
     pub largest: f64,
     /// The largest speed of a node [m/s].
     speed: f64,
@@ -68,7 +68,8 @@ impl Equilibrium {
         })
     }
 
-    /// Force [N] that holds or moves the nodes of a constraint; not a number without one of this name.
+    /// Force [N] that holds or moves the nodes of a constraint; not a number without a constraint of this
+    /// name.
     pub fn reaction(&self, constraint: &str) -> Vector<f64> {
         self.reactions.get(constraint).copied().unwrap_or([f64::NAN; 3])
     }
@@ -95,7 +96,8 @@ pub fn relax(model: &Model) -> Result<Equilibrium, CaseError> {
     Equilibrium::of(&mut relaxed(model, 1.0, Some(1e-8))?)
 }
 
-/// The same at a time [s], to a relative residual, that of double precision if not given.
+/// Runs to the equilibrium at a time [s], to a relative residual; the residual of double precision if not
+/// given.
 pub(crate) fn relaxed(model: &Model, until: f64, tolerance: Option<f64>) -> Result<Simulation, CaseError> {
     let mut part = Part::quasi_static(NAME, model.clone(), until, 1);
     part.method = Method::QuasiStatic { precision: Precision::Double, tolerance };
@@ -104,7 +106,7 @@ pub(crate) fn relaxed(model: &Model, until: f64, tolerance: Option<f64>) -> Resu
     Ok(simulation)
 }
 
-/// From 0 at the start to 1 at a time [s], with a continuous velocity.
+/// Curve from 0 at the start to 1 at a time [s], with a continuous velocity.
 pub fn smooth_step(to: f64) -> Curve {
     Curve { shape: Shape::SmoothStep, from: 0.0, to }
 }

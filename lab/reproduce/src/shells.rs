@@ -34,13 +34,13 @@ pub struct Specimen {
     pub model: Assembly,
 }
 
-/// Held on a plane of symmetry with this normal (0, 1, 2): the displacement along it and the spins about the
-/// others.
+/// Components held on a plane of symmetry with this normal (0, 1, 2): the displacement along the normal and
+/// the spins about the other axes.
 pub fn symmetry(axis: usize) -> [bool; 6] {
     std::array::from_fn(|c| (c % 3 == axis) == (c < 3))
 }
 
-/// Time, and the factor, from 0 to 1.
+/// Curve whose factor grows from 0 to 1 over the time from 0 to 1.
 pub fn ramp() -> Curve {
     Curve { shape: Shape::Ramp, from: 0.0, to: 1.0 }
 }

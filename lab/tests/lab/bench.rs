@@ -84,7 +84,7 @@ fn a_design_is_measured_on_the_device_and_named_with_it() {
 #[test]
 #[cfg(target_os = "linux")]
 fn designs_without_a_device_are_answered_with_the_packages() {
-    // None answers to Direct3D there.
+    // No adapter has Direct3D there.
     let workshop = Workshop::new("");
     let mut command = workshop.command(&["bench", "--designs", "--repeats", "1"]);
     let output: Said = command.env("WGPU_BACKEND", "dx12").output().expect("the binary starts").into();

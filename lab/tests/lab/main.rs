@@ -31,13 +31,13 @@ impl Workshop {
         self.program(env!("CARGO_BIN_EXE_pliant-lab"), arguments)
     }
 
-    /// What the binary says.
+    /// Runs the binary in the folder; returns its output.
     pub fn lab(&self, arguments: &[&str]) -> Said {
         self.command(arguments).output().expect("the binary starts").into()
     }
 }
 
-/// Whether there is a GPU; a missing one fails where it is promised.
+/// True if there is a GPU. Fails if a GPU is promised but missing.
 pub fn has_gpu() -> bool {
     pliant_testing::has_gpu(pliant_gpu::adapters().len())
 }

@@ -1,6 +1,7 @@
-//! Real scans, each by one command and then 1 s of simulation: what the mesh is like, what step it allows,
-//! what a second costs. Prints a table in Markdown and leaves each scene with its results in a folder:
-//! `PLIANT_DATA=… cargo run --release -p pliant-validation --example scans -- FOLDER [NAME …]`.
+//! Real scans, each meshed by one command and simulated for 1 s. Results are the quality of the mesh, its
+//! critical time step, and the cost of a second. Prints a table in Markdown and leaves each scene with its
+//! results in a folder: `PLIANT_DATA=… cargo run --release -p pliant-validation --example scans -- FOLDER
+//! [NAME …]`.
 //!
 //! The body lies on its back, held there over a fifth of its depth, and its weight grows over the second.
 
@@ -30,7 +31,7 @@ struct Scan {
     /// An image to be added to the first.
     add: Option<&'static str>,
     labels: &'static [i32],
-    /// Where values are taken from on, instead of labels.
+    /// Value at and above which voxels are taken, instead of labels.
     threshold: Option<f64>,
     /// Edge of the cells [m].
     edge: f64,
@@ -47,8 +48,8 @@ enum Tissue {
 }
 
 impl Tissue {
-    /// Young's modulus [Pa]; Poisson's ratio is 0.45. The tissues for which `pliant mesh` tells the stable
-    /// step.
+    /// Young's modulus [Pa]; Poisson's ratio is 0.45. The tissues for which `pliant mesh` shows the critical
+    /// time step.
     fn young(self) -> f64 {
         match self {
             Self::Liver => 2.0 * 6568.0 * 1.45,
@@ -204,7 +205,7 @@ impl Scan {
             model.solids.iter().flat_map(|solid| (0..solid.cells.len()).map(|c| solid.cells.volume(c))).sum();
         let spacing = (volume / model.node_count() as f64).cbrt();
         let tau = limits.critical.assembled.step * (modulus / DENSITY).sqrt() / spacing;
-        // What is seen of tets is their own surface, of hexes the one they carry.
+        // Tets are seen by their own surface, hexes by the surface that they carry.
         let seen = if self.cells == "tets" { &built.bodies[0].mesh } else { &built.surfaces[0] };
         let [seen, voxels] =
             [seen, &voxels].map(|mesh| TriangleMesh::from_mesh(mesh).map(|(surface, _)| surface));

@@ -1,7 +1,7 @@
-//! Larger stable steps: the liver of `scenes/liver`, a brain in stuffed tets and a cube in plain tets, in
-//! tets with averaged pressure and with mass scaling. For each: the step, the wall time of a simulated second
-//! on all cores (median of turns), and how far the motion is from that of plain tets: the largest distance of
-//! a node from its place there over the largest displacement.
+//! Larger stable steps for the liver of `scenes/liver`, a brain in stuffed tets and a cube. Each body is run
+//! in plain tets, in tets with averaged pressure, and with mass scaling. The results are the step and the
+//! wall time of a simulated second on all cores (median of turns). The deviation from the motion of plain
+//! tets is the largest distance between equal nodes over the largest displacement.
 //! `cargo run --release -p pliant-validation --example stable_step`; a word after `--` chooses the bodies
 //! whose name has it.
 
@@ -18,7 +18,7 @@ const TURNS: usize = 5;
 /// Time between two looks at a motion [s].
 const EVERY: f64 = 0.05;
 
-/// How the step becomes larger, with the assignments that make it so; BODY stands for the name of the body.
+/// Ways to a larger step, with their assignments; BODY stands for the name of the body.
 const WAYS: [(&str, &[&str]); 6] = [
     ("plain", &[]),
     ("`tet4-anp`", &["body.BODY.element=tet4-anp"]),
@@ -33,7 +33,7 @@ type Motion = Vec<Vec<[f64; 3]>>;
 
 /// A scene of one body.
 struct Organ {
-    /// What it is, in words.
+    /// Description of the body.
     what: &'static str,
     body: &'static str,
     /// Simulated time [s].
@@ -141,7 +141,7 @@ impl Measured {
         times[times.len() / 2]
     }
 
-    /// Its row of the table, beside the plain way.
+    /// Returns its row of the table, compared with the plain way.
     fn row(&self, organ: &Organ, plain: &Self) -> String {
         let model = &self.world.participants[0].built.model;
         let heavier = model.mass_scaling.as_ref().map_or(0, |scaling| scaling.nodes());

@@ -1,6 +1,7 @@
-//! Claims of the literature, each a test in `tests/`. What the tests share: materials, specimens and how to
-//! run them (from `pliant-reproduce`, which shows some of the same computations to users), and the reference
-//! numbers in `data/`. A test prints what it measured: `cargo test -p pliant-validation -- --nocapture`.
+//! Claims of the literature, each a test in `tests/`. The tests share materials, specimens and functions that
+//! run them, from `pliant-reproduce`, which shows some of the same computations to users. They also share the
+//! reference numbers in `data/`. A test prints its measurements:
+//! `cargo test -p pliant-validation -- --nocapture`.
 
 mod reference;
 mod run;

@@ -1,4 +1,4 @@
-//! Reference numbers, and what it means to meet one.
+//! Reference numbers, and claims that results meet them.
 
 use std::path::PathBuf;
 
@@ -19,7 +19,7 @@ pub fn reference(name: &str) -> Value {
     serde_json::from_str(&text).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// Prints a measured deviation beside its limit and holds it to the limit.
+/// Prints a measured deviation with its limit, and asserts the limit.
 ///
 /// # Panics
 /// If the deviation exceeds the limit or is not a number.

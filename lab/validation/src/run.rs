@@ -1,5 +1,5 @@
-//! Running a model, as a test does it: what fails, panics. Tests that read the explicit stepper's own state,
-//! errors and cut steps step it themselves; equilibria come from a simulation.
+//! Running a model in a test: failures panic. Tests that read the explicit stepper's own state, errors and
+//! cut steps step it themselves; equilibria come from a simulation.
 
 use pliant_explicit::critical_step::assembled;
 use pliant_explicit::stability::{Monitor, OnUnstable};
@@ -48,7 +48,7 @@ fn stepper<R: Scalar>(model: &Model, step: f64) -> CentralDifference<R> {
     CentralDifference::new(model.clone(), step).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// [`run`] with a monitor of the stable step, whose limit at rest is the true one.
+/// Runs like [`run`], with a monitor of the stable step whose limit at rest is the true one.
 ///
 /// # Errors
 /// If a step fails.

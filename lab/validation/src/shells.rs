@@ -1,11 +1,11 @@
-//! Shells of the literature (from `pliant-reproduce`), and the same with other numbers.
+//! Shells of the literature (from `pliant-reproduce`), and the same shells with other numbers of nodes.
 
 use pliant_geometry::Mesh;
 pub use pliant_reproduce::shells::{CLAMPED, FLAT, Specimen, ramp, sheet, symmetry, triangles};
 
 use crate::Random;
 
-/// Other numbers for nodes and corners, by chance: the same shell. Returns the new number of each node, too.
+/// Renumbers nodes and corners at random; the shell stays the same. Returns the new number of each node, too.
 pub fn renumbered(mesh: &Mesh, seed: u64) -> (Mesh, Vec<u32>) {
     let mut random = Random::new(seed);
     let mut order: Vec<u32> = (0..mesh.points.len() as u32).collect();

@@ -1,6 +1,6 @@
-//! A brain free in its skull, which is its own surface half a millimetre outward, while gravity turns by a
-//! right angle: no node goes out of the skull, the skull carries the weight, and the step is that of the free
-//! brain.
+//! A brain free in its skull, while gravity turns by a right angle. The skull is the brain's own surface half
+//! a millimetre outward. No node leaves the skull, the skull carries the weight, and the step is as long as
+//! the free brain's.
 
 use std::path::{Path, PathBuf};
 
@@ -81,8 +81,8 @@ fn an_ellipsoid_stays_in_its_skull() {
     check("ellipsoid", &text, &folder, 0.0005);
 }
 
-/// The grey and white matter of the MNI152 average brain, in tets of 12 mm, as a file that the brain and its
-/// skull are made of.
+/// Tests the grey and white matter of the MNI152 average brain, in tets of 12 mm. The brain and its skull are
+/// made of one file.
 #[test]
 #[ignore = "takes minutes"]
 fn a_real_brain_stays_in_its_skull() {

@@ -1,11 +1,11 @@
-//! Brain shift on an ellipsoid (the setting is in `brain_shift` of the library), held to a converged solution
-//! of quadratic tets at 52 points inside and, mesh by mesh, to two other codes.
+//! Brain shift on an ellipsoid (the setting is in `brain_shift` of the library). The references are a
+//! converged solution of quadratic tets at 52 points inside and, mesh by mesh, two other codes.
 
 use pliant_geometry::{Mesh, Vector3, boundary, io};
 use pliant_validation::brain_shift::{ANP, Shifted, mesh, off_on_the_same_mesh, reference_mesh, stuffed};
 use pliant_validation::{Tets, claim};
 
-/// Holds the root mean square and the largest deviation [m] at the 52 points to limits.
+/// Asserts limits of the root mean square and the largest deviation [m] at the 52 points.
 fn check_points(name: &str, mesh: Mesh, [rms_limit, largest_limit]: [f64; 2]) {
     let shifted = Shifted::new(mesh, ANP).unwrap();
     assert_eq!(shifted.at_points().len(), 52);

@@ -1,9 +1,9 @@
-//! A ball pressed on a plane, at explicit contact and at a barrier, and a tool pressed into a block, at
-//! explicit contact, against an independent axisymmetric program (`data/coupling`): quarter models of hexes
-//! whose size is a part of the distance from the place of contact.
+//! Contact compared with an independent axisymmetric program (`data/coupling`). A ball is pressed on a plane
+//! with explicit contact and with a barrier, and a tool into a block with explicit contact. The models are
+//! quarters, of hexes whose size is a part of the distance from the place of contact.
 //!
-//! Only the equilibria count. So where motion leads to them, masses are those with which all cells have about
-//! the same critical step, and motion is damped.
+//! Only the equilibria count. In dynamic runs, the masses therefore give all cells about the same critical
+//! step, and motion is damped.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -26,7 +26,7 @@ use pliant_testing::{Hexes, grown_hexes};
 use pliant_validation::{claim, reference};
 use serde_json::Value;
 
-/// Steps in which the thing moves to the next depth, and in which it then stays.
+/// Steps in which the rigid thing moves to the next depth, and in which it then stays.
 const MOVES: f64 = 600.0;
 const STAYS: f64 = 900.0;
 /// Damping over the step.
@@ -41,8 +41,8 @@ struct Quarter {
 }
 
 impl Quarter {
-    /// Of E [Pa] and ν = 0.45; the surface that may touch within a distance [m] of the pole where `is_outer`
-    /// says, and what is held along which axes.
+    /// Makes a quarter of E [Pa] and ν = 0.45. The surface that may touch is `is_outer` within a distance [m]
+    /// of the pole. `held` gives the axes along which a node is held.
     fn new(
         (points, hexes): Hexes,
         young: f64,
@@ -69,7 +69,7 @@ impl Quarter {
         let cells = &model.solids[0].cells;
         let mut mass = vec![0.0; points.len()];
         for cell in 0..cells.len() {
-            // As of cells of 1 mm: a wave takes the same time through each.
+            // The mass as for cells of 1 mm: a wave takes the same time through each cell.
             let part = 1e-6 * 1000.0 * cells.volume(cell).cbrt() / 8.0;
             cells.nodes(cell).iter().for_each(|&node| mass[node as usize] += part);
         }
@@ -106,7 +106,7 @@ impl Quarter {
         self.faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect()
     }
 
-    /// Nodes that may touch, and those of them that have x and y below a length [m] at rest.
+    /// Nodes that may touch, and among them the nodes with x and y below a length [m] at rest.
     fn nodes(&self, near_pole: f64) -> [Vec<u32>; 2] {
         let mut nodes: Vec<u32> = self.faces.iter().flatten().copied().collect();
         nodes.sort_unstable();
@@ -121,9 +121,9 @@ fn radius([x, y, _]: Vector<f64>) -> f64 {
     x.hypot(y)
 }
 
-/// What is found at a depth: the force [N] of the whole body, radii [m] of the last node on the x axis that
-/// touches and of the first that does not, pressure [Pa] around the pole, and by how much the force still
-/// changes, over it.
+/// Results at a depth: the force [N] of the whole body, and the pressure [Pa] around the pole. `radii` [m]
+/// are for the last node on the x axis that touches and the first that does not. `change` is the remaining
+/// change of the force over the force.
 struct Pressed {
     force: f64,
     radii: [f64; 2],
@@ -131,8 +131,8 @@ struct Pressed {
     change: f64,
 }
 
-/// Moves a shape from a pose along z to each of the depths [m] and lets the body come to rest there.
-/// `near_pole` [m] says up to which x and y pressure is measured.
+/// Moves a shape from a pose along z to each of the depths [m] and lets the body come to rest there. Pressure
+/// is measured at x and y up to `near_pole` [m].
 fn pressed(
     quarter: &Quarter,
     shape: Shape,
@@ -172,7 +172,7 @@ fn pressed(
         |stepper: &CentralDifference<f64>, which: usize| 4.0 * stepper.contact_forces()[which][2].abs();
     let mut all = Vec::new();
     for k in 1..=depths.len() {
-        // A step feels where the thing is at its end, which must be before it moves on.
+        // A step uses the pose at its end, which must be before the thing moves on.
         let until = (k as f64 * (MOVES + STAYS) - 2.0) * step;
         let mut before = 0.0;
         while state.time < until - 0.5 * step {
@@ -210,8 +210,8 @@ fn pressed(
 /// The gap [m] below which the barrier acts: 1 % of the least depth.
 const BARRIER: f64 = 2e-6;
 
-/// Moves a plane from the pole on by each of the depths [m], in load steps of a tenth of a millimetre, in
-/// equilibrium with a barrier. It starts half of the gap of the barrier below, about what remains under
+/// Moves a plane from the pole to each of the depths [m], in equilibrium with a barrier. Load steps are a
+/// tenth of a millimetre. The plane starts half of the barrier's gap below the pole, about the gap under
 /// pressure.
 fn pressed_at_a_barrier(quarter: &Quarter, depths: &[f64], near_pole: f64) -> Vec<Pressed> {
     let points = depths.iter().zip(1..).map(|(depth, time)| (f64::from(time), *depth));
@@ -270,8 +270,8 @@ fn column(rows: &[&Value], key: &str) -> Vec<f64> {
 }
 
 /// A quarter of the upper half of a ball of 20 mm, its pole at the origin. Half a ball, fine around the
-/// middle of its flat side, is inverted about the far pole: the flat side becomes the sphere, the sphere the
-/// plane of the equator, and angles stay.
+/// middle of its flat side, is inverted about the far pole. The flat side becomes the sphere, the sphere
+/// becomes the plane of the equator, and angles stay.
 fn ball(cells: i32, layers: i32) -> Quarter {
     let (radius, inner) = (0.02, 0.001);
     let size = radius / inner;
@@ -289,9 +289,9 @@ fn ball(cells: i32, layers: i32) -> Quarter {
     Quarter::new(hexes, 1e4, 0.015, |x| height(x).abs() < 1e-9, |x| [false, false, x[2] > radius - 1e-9])
 }
 
-/// Presses the ball on a plane (A3): a finite sphere is stiffer than Hertz's by 4 to 30 %. Its pressure is
-/// held to Hertz's relation with the force, p₀³ = 6 F E*²/(π³ R²), up to 1 mm: the pressure of the reference
-/// is up to 8 % below that at the smallest depth, where it is exact.
+/// Presses the ball on a plane (A3): a finite sphere is stiffer than Hertz's by 4 to 30 %. Up to 1 mm its
+/// pressure is compared with Hertz's relation to the force, p₀³ = 6 F E*²/(π³ R²). At the smallest depth,
+/// where this relation is exact, the pressure of the reference is up to 8 % lower.
 fn check_ball(cells: i32, layers: i32, at_a_barrier: bool, wanted: &[f64], limits: [f64; 2]) {
     let data = reference("coupling/hertz_sphere_large.json");
     let rows = data["rows"].as_array().unwrap();

@@ -176,9 +176,9 @@ fn patch(
     forces.into_iter().map(|(node, f)| (node, [0.0, 0.0, f * total / sum])).collect()
 }
 
-/// A quarter of the block of 40 × 40 × 20 mm with coat A, under a patch of traction of F on the whole block:
-/// displacement [m] of the middle of its top. Six tets a cube, n cubes over the 10 mm at the patch and half
-/// as many over the 10 mm beyond.
+/// Solves a quarter of the block of 40 × 40 × 20 mm with coat A, under a patch of traction of F on the whole
+/// block. Returns the displacement [m] of the middle of its top. Each cube has six tets. There are n cubes
+/// over the 10 mm at the patch and half as many over the 10 mm beyond.
 fn block_patch(n: u32, force: f64) -> f64 {
     let count = 3 * n / 2 + 1;
     let fine = 0.01 / f64::from(n);
@@ -224,7 +224,7 @@ fn block_patch(n: u32, force: f64) -> f64 {
     state.displacement[at(0, 0, n) as usize][2]
 }
 
-/// Of the middle of the top at full load [m].
+/// Displacement of the middle of the top at full load [m].
 fn centre(data: &Value, row: &str) -> f64 {
     let rows = data["rows"][row].as_array().unwrap();
     numbers(&rows[rows.len() - 1]["probes"]["(0.0, 0.0, 20.0)"])[2]
@@ -246,8 +246,8 @@ fn a_coated_block_converges_to_the_reference() {
     }
 }
 
-/// The ellipsoid of 60 × 45 × 30 mm held at its back and pulled at its front, with or without a capsule:
-/// displacements [m] of the five probes over the reference's largest.
+/// Errors of an ellipsoid of 60 × 45 × 30 mm, held at its back and pulled at its front, with or without a
+/// capsule. They are errors of the displacements of the five probes, over the reference's largest.
 fn ellipsoid_off(edge: f64, data: &Value, row: &str) -> f64 {
     let ellipsoid = Ellipsoid { centre: Vector3::zeros(), radii: Vector3::new(0.06, 0.045, 0.03) };
     let mesh = Stuffing::new(edge).mesh(&ellipsoid).unwrap().mesh;
@@ -307,8 +307,8 @@ fn an_ellipsoid_in_its_capsule_converges_to_the_reference() {
 /// A layer of a tube: radii [m] and Young's modulus [Pa], ν = 0.45.
 type Layer = [f64; 3];
 
-/// A quarter of a slice of a tube in plane strain, in full hexahedra: each layer with its own number of cells
-/// round and through it. The inner layer is tied to the next.
+/// A quarter of a slice of a tube in plane strain, in full hexahedra. Each layer has its own number of cells
+/// around and through the wall. The inner layer is tied to the next.
 struct Tube {
     model: Model,
     /// The nodes of the inner and of the outer surface.
@@ -390,8 +390,8 @@ fn tube(layers: &[(Layer, [usize; 2])]) -> Tube {
     Tube { surfaces: [rings[0][0].clone(), rings[last][1].clone()], model }
 }
 
-/// The pressure [Pa] at which the inner surface, moved to a radius [m] as by a balloon, holds, and the radius
-/// of the outer one.
+/// Moves the inner surface to a radius [m], as a balloon does. Returns its pressure [Pa], and the radius of
+/// the outer surface.
 fn inflated(mut tube: Tube, radius: f64) -> [f64; 2] {
     let rest = tube.model.rest.clone();
     let inner = &tube.surfaces[0];
@@ -453,8 +453,8 @@ fn thick_and_layered_tubes_are_inflated_as_in_closed_form() {
     claim("tubes of two tied layers: pressure and outer radius", worst[1], 0.01);
 }
 
-/// A liver and its portal vein from a scan (TotalSegmentator), as `pliant mesh` makes a scene of them:
-/// stiffer in its capsule, with the energy balanced.
+/// Tests a liver and its portal vein from a scan (TotalSegmentator), in the scene that `pliant mesh` makes.
+/// The liver is stiffer in its capsule, and the energy is balanced.
 #[test]
 fn a_segmented_liver_is_pulled_with_and_without_its_capsule() {
     let Some(data) = std::env::var_os("PLIANT_DATA").map(std::path::PathBuf::from) else {
@@ -470,7 +470,7 @@ fn a_segmented_liver_is_pulled_with_and_without_its_capsule() {
         edge: 0.014,
         vessels: vec![(format!("{}, label = 1", mask("fast_portal_vein_and_splenic_vein.nii.gz")), 1e-3)],
         capsule: Some(1e-4),
-        // Of the mask.
+        // Bounds of the mask.
         bounds: [Vector3::new(-0.0655, 0.0848, 0.0928), Vector3::new(0.1355, 0.2708, 0.1828)],
     };
     let pulled = |organ: &pliant_format::OrganScene| {

@@ -10,8 +10,8 @@ use pliant_validation::{
 };
 use serde_json::{Value, json};
 
-/// A block of soft tissue held at one end, under a gravity so small that its strain, 1e-4 at most, leaves the
-/// limit where it is at rest.
+/// A block of soft tissue held at one end under a small gravity. Its strain, at most 1e-4, leaves the
+/// critical step as at rest.
 fn block(cells: VolumeCell) -> Specimen {
     Specimen::block([0.1, 0.05, 0.05], [8, 4, 4], cells, &elastic(soft_tissue()), [0.0; 3])
         .fix("x-min", [true; 3])
@@ -64,7 +64,7 @@ fn element_bound_is_a_bound_for_every_tissue_free_or_held() {
             println!(
                 "{name}, {cells:?}: bound {bound:.4e}, critical time step {loose:.4e} free, {tight:.4e} held [s]"
             );
-            // Holding nodes only takes motions away. 1e-4: what the Lanczos method leaves open.
+            // Holding nodes only takes motions away. 1e-4 is the accuracy of the Lanczos method.
             assert!(bound <= loose && loose <= tight * (1.0 + 1e-4));
         }
     }
@@ -105,7 +105,7 @@ fn twelve_elements_from_regular_to_sliver_have_the_published_bounds_and_limits()
         let bound = cell_bound(&model.solids[0], 0);
         println!("{name}: bound over exact {:.6}", bound / exact);
         assert!(bound <= exact);
-        // As printed in the literature's review of this project: 0.987 to 1.0 for tets, to 0.997 for hexes.
+        // This project's review of the literature has 0.987 to 1.0 for tets, and to 0.997 for hexes.
         assert!((0.9865..=if name.starts_with("tet4") { 1.0 } else { 0.9975 }).contains(&(bound / exact)));
         claim(&format!("{name}: bound, off by"), (bound / published - 1.0).abs(), 1e-9);
         // 1e-4: where the Lanczos method stops; it errs on the safe side.

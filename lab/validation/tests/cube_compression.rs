@@ -1,6 +1,6 @@
 //! The thesis's cube [0, 0.1 m]³ between glued platens, quasi-static, split neo-Hookean with E = 3000 Pa, ν =
-//! 0.45 unless said otherwise. At 20 % the answer converges with the mesh; at 30 % it does not (the glued
-//! edge is singular and folds over the platen), so that only solutions on one and the same mesh compare.
+//! 0.45 unless said otherwise. At 20 % the answer converges with the mesh; at 30 % it does not, because the
+//! glued edge is singular and folds over the platen. There only solutions on the same mesh can be compared.
 
 use pliant_geometry::io;
 use pliant_mechanics::law::AnyLaw;

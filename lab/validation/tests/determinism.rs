@@ -1,4 +1,5 @@
-//! The same bits on any number of threads and in every run, and how far single precision stands from double.
+//! Determinism: every run gives the same bits on any number of threads. Single precision is also compared
+//! with double.
 
 use pliant_explicit::{Scalar, State};
 use pliant_geometry::{CellBlock, Mesh, Vector3};

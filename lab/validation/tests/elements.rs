@@ -1,5 +1,5 @@
-//! Which element to trust for nearly incompressible tissue, ν = 0.49: the cantilever under its own weight and
-//! the glued cube at 20 %, as `pliant-lab reproduce` computes them. Prints the study's table.
+//! Accuracy of the elements for nearly incompressible tissue, ν = 0.49. The cases are the cantilever under
+//! its own weight and the glued cube at 20 %, as in `pliant-lab reproduce`. Prints the study's table.
 
 use pliant_reproduce::cases::elements::{ELEMENTS, FORCE, TIP, force, percent_off, tip};
 use pliant_validation::claim;

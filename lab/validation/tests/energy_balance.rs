@@ -1,8 +1,8 @@
 //! Energy is conserved: kinetic + internal + damping + hourglass = work of gravity, at every instant. A block
-//! hangs from its top and gravity sets in at once. At 0.9 of the critical time step it is a stiff block (E =
-//! 20 kPa): soft tissue (E = 3 kPa) stretches so far, by 38 % on the whole, that the limit falls below 0.9 of
-//! its value at rest and the run diverges; it goes by 0.9 of the element bound. `stability.rs` has it with
-//! cut steps.
+//! hangs from its top and gravity sets in at once. At 0.9 of the critical time step the block is stiff (E =
+//! 20 kPa). Soft tissue (E = 3 kPa) stretches by 38 % on the whole. The limit then falls below 0.9 of its
+//! value at rest, and the run would diverge. Soft tissue therefore takes 0.9 of the element bound;
+//! `stability.rs` tests it with cut steps.
 
 use pliant_explicit::{CentralDifference, Observable, State, critical_step};
 use pliant_mechanics::law::AnyLaw;
@@ -21,9 +21,10 @@ fn stiff() -> AnyLaw {
     law("neo-hookean", json!({ "young-modulus": 20_000.0, "poisson-ratio": 0.45 }))
 }
 
-/// The imbalance over 0.4 s, relative to the largest energy so far: after the first 20 steps, which strike
-/// the block and show nearly no energy yet, at most 1 %. A step close to the limit barely resolves the
-/// highest vibration and could not do much better; a wrong force or work is off by far more.
+/// Claims that the energy is off balance by at most 1 % over 0.4 s, relative to the largest energy so far.
+/// The first 20 steps, which strike the block and have nearly no energy yet, are left out. A step close to
+/// the limit barely resolves the highest vibration, so 1 % is close to the best. A wrong force or work is off
+/// by far more.
 fn is_conserved(block: &Specimen, step: f64, what: &str) {
     let (mut first_steps, mut later) = (0.0, 0.0);
     let (stepper, state) = run::<f64>(&block.model, step, 0.4, |stepper, state| {
@@ -56,8 +57,8 @@ fn hanging_tets_and_hexes_lose_to_damping_what_they_lack() {
     }
 }
 
-/// Between small vibrations in modes that the steps hardly resolve, whose length changes again and again, ⅛
-/// Δt⁻² Σ m|a|² is all that is missing: each change of the length has entered its energy.
+/// Tests steps whose length changes again and again, with small vibrations in modes that the steps hardly
+/// resolve. Only ⅛ Δt⁻² Σ m|a|² is missing: each change of the length has entered its energy.
 #[test]
 fn steps_that_change_their_length_again_and_again_keep_the_book() {
     for cells in [VolumeCell::Tet, VolumeCell::Hex] {

@@ -1,4 +1,4 @@
-//! A run that cannot go on says what happened.
+//! A run that cannot continue reports the reason.
 
 use pliant_explicit::{CentralDifference, State, StepError};
 use pliant_mechanics::curve::{Curve, Shape};

@@ -1,7 +1,7 @@
 //! Immersed hexahedra: every cube that an organ touches, with its stiffness and mass by the part that the
-//! organ fills, against cubes by majority and against tetrahedra, on the analytic liver: volume, the critical
-//! time step of the step, and how it hangs under its weight from a plane that is one of every grid. τ = Δt c
-//! / h with h = (V / nodes)^(1/3).
+//! organ fills. They are compared with cubes by majority and with tetrahedra, on the analytic liver. The
+//! tests compare volume, critical time step, and displacement under weight. The liver hangs from a plane of
+//! every grid. τ = Δt c / h with h = (V / nodes)^(1/3).
 
 use pliant_geometry::{Locator, Mesh, Vector3};
 use pliant_mechanics::model::{Averaging, Constraint, Motion};
@@ -13,8 +13,8 @@ const YOUNG: f64 = 3000.0;
 const POISSON: f64 = 0.45;
 const DENSITY: f64 = 1000.0;
 
-/// The liver in a box that is the same whole even number of cubes of 8, 10 and 20 mm: all grids share the
-/// plane x = −40 mm.
+/// The liver in a box that is a whole, even number of cubes of 8, 10 and 20 mm. All grids share the plane x =
+/// −40 mm.
 struct Boxed(Phantom);
 
 impl ImplicitField for Boxed {
@@ -59,7 +59,7 @@ impl Hanging {
         solids.flat_map(|solid| (0..solid.cells.len()).map(|cell| solid.cells.volume(cell))).sum()
     }
 
-    /// τ by the critical time step of the body without anything that holds it.
+    /// τ by the critical time step of the free body.
     fn tau(&self) -> f64 {
         let mut free = self.specimen.model.clone();
         free.constraints.clear();
@@ -89,7 +89,7 @@ fn points(liver: &Boxed) -> Vec<Vector3> {
     all.filter(|point| point.x > -0.04 && liver.value(point) > 0.001).collect()
 }
 
-/// Root mean square of a − b over that of b.
+/// Root mean square of a − b over the root mean square of b.
 fn apart(a: &[Vector3], b: &[Vector3]) -> f64 {
     let squares: f64 = a.iter().zip(b).map(|(a, b)| (a - b).norm_squared()).sum();
     (squares / b.iter().map(Vector3::norm_squared).sum::<f64>()).sqrt()
@@ -114,7 +114,7 @@ fn head() {
     );
 }
 
-/// A step as long as that of full cubes (0.9 and more), with the volume of the body.
+/// Immersed cubes have a step as long as full cubes (0.9 and more), and the volume of the body.
 #[test]
 fn immersed_cubes_keep_the_volume_and_the_step() {
     for edge in [0.010, 0.008] {
@@ -126,8 +126,8 @@ fn immersed_cubes_keep_the_volume_and_the_step() {
     }
 }
 
-/// Cubes by majority are off to either side, by chance; immersed ones are too stiff, as their fractions are
-/// smeared over whole cubes: at 10 mm they are farther off than those by majority.
+/// Cubes by majority are off to either side, by chance. Immersed cubes are too stiff, as their fractions are
+/// smeared over whole cubes. At 10 mm they are farther off than cubes by majority.
 #[test]
 #[ignore = "slow: a minute in release"]
 fn how_cubes_and_tets_hang() {

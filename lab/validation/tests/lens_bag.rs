@@ -1,5 +1,5 @@
 //! `scenes/lens/bag.toml`: a lens is folded, pushed through a tube of 2.6 mm and comes into a capsular bag
-//! that deforms. Each state is searched for edges that go through triangles; one would end the run.
+//! that deforms. Each state is searched for edges that go through triangles; such an edge would end the run.
 
 use std::path::Path;
 
@@ -10,12 +10,12 @@ use pliant_geometry::{CellKind, Mesh};
 use pliant_scene::World;
 use rayon::prelude::*;
 
-/// Where the tube ends along y [m].
+/// End of the tube along y [m].
 const TUBE_ENDS: f64 = 30e-3;
 /// The size of the force [N] between the lens and the bag above which they touch: the lens weighs 0.14 mN.
 const TOUCHES: f64 = 1e-4;
 
-/// How far the bag gives way at least [m] where the lens lies in it.
+/// Least displacement [m] of the bag where the lens lies in it.
 const GIVES: f64 = 3e-5;
 
 /// Layers of the lens, 0.3 mm thick, keep this distance of their middle surfaces at least [m].
@@ -24,7 +24,7 @@ const APART: f64 = 0.28e-3;
 const NEIGHBOURS: f64 = 0.36e-3;
 
 /// The least distance [m] of points and triangles, and of edges, of a mesh of triangles that are no
-/// neighbours at rest. Those farther apart than a millimetre are not looked at.
+/// neighbours at rest. Pairs farther apart than a millimetre are left out.
 struct Layers {
     edges: Vec<[u32; 2]>,
     triangles: Vec<[u32; 3]>,

@@ -128,7 +128,7 @@ fn moved_nodes_follow_their_curve_and_a_velocity_adds_up_to_its_integral() {
     }
 }
 
-/// Both ends of a block turn about an axis beside it: every node of theirs stays on its circle, and in
+/// Turns both ends of a block about an axis outside the block. Every node of the ends stays on its circle. In
 /// equilibrium the block has turned as a whole, without stress.
 #[test]
 fn rotated_nodes_stay_on_their_circles_and_turn_a_body_without_stress() {

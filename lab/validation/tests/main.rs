@@ -1,5 +1,5 @@
 //! Claims of the literature, a module each. They are one program, so that shared code is compiled once and
-//! slow tests of one module run beside those of others.
+//! slow tests of all modules run at the same time.
 
 mod brain_in_skull;
 mod brain_shift;

@@ -1,5 +1,4 @@
-//! Mass scaling: which critical time step it reaches with how much mass, and what it changes in motion and at
-//! rest.
+//! Mass scaling: the critical time steps for added masses, and the changes of motion and equilibrium.
 
 use pliant_explicit::critical_step::assembled;
 use pliant_explicit::mass_scaling::{Goal, scale_mass};
@@ -44,7 +43,7 @@ fn scaled(model: &Model, goal: Goal) -> Model {
     model
 }
 
-/// Added mass over that of the material.
+/// Added mass over the mass of the material.
 fn share(model: &Model) -> f64 {
     model.mass_scaling.as_ref().unwrap().total() / model.mass.iter().sum::<f64>()
 }
@@ -168,7 +167,7 @@ fn motion(model: &Model, every: f64, until: f64) -> Vec<Vec<Vector<f64>>> {
     seen
 }
 
-/// The deviation of a motion from that without added mass, over the largest displacement.
+/// The deviation of a motion from the motion without added mass, over the largest displacement.
 fn deviation(model: &Model, added: f64, until: f64) -> f64 {
     let every = until / 20.0;
     let [plain, heavy] =

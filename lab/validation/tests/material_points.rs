@@ -1,11 +1,12 @@
-//! Energies and stresses of the laws at eight deformations, against complex-step derivatives of the energies:
-//! one test a reference material, its parameters as the file's `definition` gives them.
+//! Energies and stresses of the laws at eight deformations, compared with complex-step derivatives of the
+//! energies. Each reference material has one test, with the parameters of the file's `definition`.
 
 use pliant_mechanics::law::AnyLaw;
 use pliant_validation::{claim, deformation, largest, law, numbers, reference};
 use serde_json::{Value, json};
 
-/// Shear modulus of the materials with a neo-Hookean part [Pa]; the others come within a factor of two of it.
+/// Shear modulus of the materials with a neo-Hookean part [Pa]; the other materials come within a factor of
+/// two.
 const SHEAR: f64 = 0.7;
 /// First fibre family.
 const FIBRE: [f64; 3] = [0.6, 0.0, 0.8];
@@ -124,7 +125,7 @@ fn every_reference_material_is_named_by_a_test_of_this_file() {
     }
 }
 
-/// μ = 0.7, κ = 5, and what else the law has.
+/// μ = 0.7, κ = 5, and further parameters of the law.
 fn matrix(extra: Value) -> Value {
     let mut all = json!({ "shear-modulus": SHEAR, "bulk-modulus": 5.0 });
     all.as_object_mut().unwrap().extend(extra.as_object().unwrap().clone());
@@ -169,7 +170,7 @@ fn check_within(model: &str, law: &AnyLaw, tolerance: f64) {
     claim(&format!("{model}: energy"), largest(energy), tolerance);
 }
 
-/// Of the six components of a symmetric tensor.
+/// Norm of the six components of a symmetric tensor.
 fn norm(s: &[f64]) -> f64 {
     s.iter().map(|x| x * x).sum::<f64>().sqrt()
 }

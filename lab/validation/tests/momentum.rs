@@ -35,8 +35,8 @@ fn struck_body_takes_up_the_impulse_and_keeps_momentum_and_angular_momentum() {
     for cells in ELEMENTS {
         let block = block(cells);
         let step = 0.8 * block.element_bound();
-        // A triangle of force in time, peak 0.4 N after 10 steps, gone after 20; its corners lie on steps, so
-        // that the trapezoidal rule of the method integrates it exactly.
+        // A triangle of force in time, with its peak of 0.4 N after 10 steps and its end after 20. Its
+        // corners lie on steps, so that the method's trapezoidal rule integrates it exactly.
         let [rise, end] = [10.0 * step, 20.0 * step];
         let curve =
             Curve { shape: Shape::Table(vec![(0.0, 0.0), (rise, 1.0), (end, 0.0)]), from: 0.0, to: end };

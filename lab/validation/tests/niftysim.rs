@@ -13,12 +13,12 @@ use pliant_mechanics::tensor::{Vector, dot, sub};
 
 use pliant_validation::{claim, data_file, largest};
 
-/// Steps after which NiftySim wrote its answer: it takes one more than the total time holds, and its "step
-/// 400", counted from 0, ends at 401 Δt. (Measured: 401 differs by 5e-6, its neighbours by 1.1e-4 for the
-/// tets.)
+/// Steps after which NiftySim wrote its answer. NiftySim takes one step more than the total time holds, and
+/// its "step 400", counted from 0, ends at 401 Δt. (Measured: 401 differs by 5e-6, its neighbours by 1.1e-4
+/// for the tets.)
 const STEPS: usize = 401;
 
-/// Displacements [m] after so many steps of the imported model.
+/// Displacements [m] of the imported model after [`STEPS`].
 fn displacements(name: &str) -> Vec<Vector<f64>> {
     displacements_of(&data_file(&format!("niftysim/{name}.xml")))
 }
@@ -86,7 +86,7 @@ fn niftysim_tets_with_averaged_pressure_polynomial() {
     meets_niftysim("T4ANP_PY", 5e-3);
 }
 
-/// What moves or loads the nodes of a cube's top.
+/// Motion or load of the nodes of a cube's top.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Load {
     Displacement,
@@ -98,9 +98,9 @@ enum Load {
     PressureNow,
 }
 
-/// NiftySim's main loop with four-noded neo-Hookean tetrahedra, written down from its source apart from
-/// Pliant's code, in double precision: a load set after a step acts in the next one, a displacement is that
-/// of the step's end.
+/// NiftySim's main loop with four-noded neo-Hookean tetrahedra, in double precision. It is written after
+/// NiftySim's source, independently of Pliant's code. A load set after a step acts in the next step; a
+/// displacement holds at the step's end.
 struct Loop {
     rest: Vec<Vector3<f64>>,
     cells: Vec<[usize; 4]>,
@@ -212,8 +212,8 @@ fn niftysims_main_loop_as_written_down_meets_niftysim() {
     claim("the loop: displacements over the largest", off(&ours, &niftysim_answer("T4_NH")), 2e-5);
 }
 
-/// Every load with every shape acts at the same steps as NiftySim's. What NiftySim does in single precision,
-/// the loop above does in double. Once RAMP and STEP were a step apart: 2e-3.
+/// Every load with every shape acts at the same steps as NiftySim's. The loop above does in double precision
+/// what NiftySim does in single. RAMP and STEP a step apart would give 2e-3.
 #[test]
 fn niftysims_load_shapes_act_at_niftysims_steps() {
     let model = fs::read_to_string(data_file("niftysim/T4_NH.xml")).unwrap();
@@ -235,8 +235,8 @@ fn niftysims_load_shapes_act_at_niftysims_steps() {
         ("STEP", &|_| 1.0),
         ("HILLY", &hilly),
     ];
-    // A pressure of NiftySim acts on the faces of the step before, the scene's on those of the instant:
-    // 1.3e-3, but at the same steps. Nodes that are displaced at once start displaced in the scene.
+    // A pressure of NiftySim acts on the faces of the step before, the scene's on the current faces: 1.3e-3,
+    // but at the same steps. Nodes that are displaced at once start displaced in the scene.
     let loads = [
         (Load::Displacement, 0.005, 1e-6),
         (Load::Force, 0.02, 1e-6),

@@ -1,7 +1,7 @@
 //! Meshes of the label images of the analytic organs, made for the time step: the meshing specification's T2,
-//! T3 and T5. τ = Δt c / h with h = (V / nodes)^(1/3) compares meshes of different density; Δt is the
-//! critical time step. Of the same organs, TetGen gives τ = 0.02 to 0.29, fTetWild 0.19, Gmsh 0.29 to 0.52,
-//! and the ideal lattice 0.73.
+//! T3 and T5. Meshes of different density are compared by τ = Δt c / h with h = (V / nodes)^(1/3). Δt is the
+//! critical time step. For the same organs, TetGen gives τ = 0.02 to 0.29, fTetWild 0.19, and Gmsh 0.29 to
+//! 0.52. The ideal lattice has 0.73.
 
 use pliant_geometry::{Mesh, Vector3};
 use pliant_imaging::{Cleaning, LabelImage, ReadOptions, Smoothing, read};
@@ -150,8 +150,8 @@ fn the_critical_step_of_an_organ_is_sharp() {
     println!("1.1 of the critical time step fails after {steps} steps: {failure}");
 }
 
-/// White matter of an average brain, folded as finely as the cells: a boundary in which no two sheets meet in
-/// a point or an edge. Meshes of it once had two such points.
+/// Meshes the white matter of an average brain, folded as finely as the cells. No two sheets of the boundary
+/// meet in a point or an edge.
 #[test]
 #[ignore = "slow: real organ"]
 fn white_matter_has_no_pinch_points() {

@@ -1,5 +1,5 @@
-//! A finger that presses 15 mm into a liver and sweeps over it at 100 mm/s, again and again: no node goes far
-//! into the finger, its force does not jump, and energies stay sound.
+//! A finger that presses 15 mm into a liver and sweeps over it at 100 mm/s, again and again. No node goes far
+//! into the finger, the force does not jump, and energies stay sound.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -14,7 +14,7 @@ use pliant_validation::claim;
 /// Seconds from one press to the next.
 const PERIOD: f64 = 3.0;
 
-/// The force may change by this part of its peak within a millisecond.
+/// Plays some presses. The force may change by at most `most` of its peak within a millisecond.
 fn check(presses: u32, most: f64) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/palpation");
     let [scene, finger] =
@@ -89,6 +89,6 @@ fn two_presses_keep_energies_sound() {
 #[test]
 #[ignore = "a minute of simulated time"]
 fn a_minute_of_presses_keeps_energies_sound() {
-    // A tenth is asked for. It is missed where a node strikes the finger in a single step.
+    // A node that strikes the finger in a single step changes the force by more than a tenth.
     check(20, 0.15);
 }

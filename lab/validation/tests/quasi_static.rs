@@ -1,5 +1,5 @@
-//! Quasi-static equilibria by dynamic relaxation, held to other codes on the same meshes: the thesis's cube
-//! [0, 0.1 m]³ compressed by 30 %.
+//! Quasi-static equilibria by dynamic relaxation, compared with other codes on the same meshes: the thesis's
+//! cube [0, 0.1 m]³ compressed by 30 %.
 
 use pliant_explicit::{DynamicRelaxation, RelaxationError, RelaxationSettings, State};
 use pliant_geometry::{Mesh, io};
@@ -14,8 +14,8 @@ use pliant_validation::{
 };
 use serde_json::Value;
 
-/// A load step that comes to no equilibrium, halved or not, leaves displacements, history and work as they
-/// were, bit for bit: the same step by a patient solver then ends where it would have ended.
+/// A load step that finds no equilibrium, even when halved, leaves displacements, history and work unchanged,
+/// bit for bit. A solver with more iterations can then take the same step.
 #[test]
 fn a_failed_load_step_leaves_the_state_untouched() {
     let material =
@@ -47,7 +47,7 @@ fn a_failed_load_step_leaves_the_state_untouched() {
     }
 }
 
-/// The cube with x = 0 held and x = 0.1 moved by −0.03, of certain elements.
+/// The cube with x = 0 held and x = 0.1 moved by −0.03, of given elements.
 fn compressed(mesh: Mesh, tets: Tets, hexes: Hexes, law: AnyLaw) -> Specimen {
     Specimen::of_elements(mesh, tets, hexes, &elastic(law), [0.0, 1.0, 0.0])
         .shift("x-max", -0.03, smooth_step(1.0))

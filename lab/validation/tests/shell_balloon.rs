@@ -1,6 +1,6 @@
-//! A thin balloon, R/t = 50, blown up to twice its volume, against the sphere of linear elasticity in its
-//! stretch, which the co-rotational element is: W = 4π R² t E (λ − 1)²/(1 − ν), so p = 2 E t (λ − 1)/((1 − ν)
-//! R λ²). A sphere of St. Venant–Kirchhoff, linear in λ²: p = E t (λ² − 1)/((1 − ν) R λ).
+//! A thin balloon, R/t = 50, blown up to twice its volume. The reference is a sphere whose elasticity is
+//! linear in its stretch, as the co-rotational element's. W = 4π R² t E (λ − 1)²/(1 − ν), so p = 2 E t (λ −
+//! 1)/((1 − ν) R λ²). A sphere of St. Venant–Kirchhoff is linear in λ²: p = E t (λ² − 1)/((1 − ν) R λ).
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
@@ -43,8 +43,8 @@ fn ball(cuts: usize) -> Mesh {
     Mesh { points, blocks: vec![CellBlock::new(CellKind::Triangle, nodes)], ..Mesh::default() }
 }
 
-/// Pressure over that of the sphere after so many twentieths of the volume more, largest tilt of a node
-/// [rad], least and largest radius.
+/// Blows the balloon up by `parts` twentieths of its volume. Returns the pressure over the sphere's, the
+/// largest tilt of a node [rad], and the least and the largest radius.
 fn blown_up(cuts: usize, membrane: Membrane, parts: u32) -> [f64; 4] {
     let formulation = Formulation { membrane, ..Formulation::default() };
     let mut mesh = ball(cuts);
@@ -72,7 +72,7 @@ fn blown_up(cuts: usize, membrane: Membrane, parts: u32) -> [f64; 4] {
         }
     }
     let stretch = (model.enclosed_volume(&cells, &state.position) / rest).cbrt();
-    // Of the polyhedron: its volume is that of a slightly smaller sphere.
+    // The polyhedron has the volume of a slightly smaller sphere.
     let radius = (rest / (4.0 / 3.0 * PI)).cbrt();
     let exact = 2.0 * YOUNG * THICKNESS * (stretch - 1.0) / ((1.0 - POISSON) * radius * stretch * stretch);
     let centre = state.position.iter().sum::<Vector3>() / state.position.len() as f64;
@@ -96,8 +96,8 @@ fn blown_up(cuts: usize, membrane: Membrane, parts: u32) -> [f64; 4] {
     result
 }
 
-/// With constant strain the pressure comes to that of the sphere with the square of the edges, and normals
-/// stay radial but for what the angles of the facets leave; drilling counts for nothing.
+/// With constant strain the pressure converges to the sphere's with the square of the edges. Normals stay
+/// radial except for the angles between facets. Drilling has no effect.
 #[test]
 fn a_balloon_of_constant_strain_has_the_pressure_of_the_sphere() {
     for (cuts, off, tilted) in [(2, 0.012, 0.05), (3, 0.004, 0.03), (4, 0.001, 0.016)] {
@@ -120,8 +120,8 @@ fn a_balloon_of_andes_facets_tilts_its_nodes_on_coarse_meshes() {
     claim("pressure off the sphere's, 2048 facets", (fine_off - 1.0).abs(), 0.001);
 }
 
-/// Curved elements with the pressure of the curved surface, at 1.35 times the volume (10 % strain); at twice
-/// the volume, 26 %, the balloon of 512 finds no equilibrium any more.
+/// Tests curved elements with the pressure of the curved surface, at 1.35 times the volume (10 % strain). At
+/// twice the volume (26 % strain), the balloon of 512 facets finds no equilibrium.
 #[test]
 fn a_balloon_of_curved_elements_has_the_pressure_of_the_sphere() {
     for (cuts, off) in [(2, 0.03), (3, 0.01)] {

@@ -1,6 +1,6 @@
-//! Organs by few curved shells, and how close these are both ways: the meshing specification's S3 and the
-//! thesis's Figs 9.1 to 9.3. Organs from files are read through `PLIANT_DATA`; without it those tests print a
-//! notice and pass.
+//! Organs by few curved shells, and the distances both ways: the meshing specification's S3 and the thesis's
+//! Figs 9.1 to 9.3. Organs from files are read through `PLIANT_DATA`; without it those tests print a notice
+//! and pass.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -19,7 +19,8 @@ fn organ(path: &str) -> Option<TriangleMesh> {
     Some(TriangleMesh::from_mesh(&file.mesh).unwrap().0)
 }
 
-/// Largest distances of both ways in percent of the diagonal, and number of shells.
+/// Asserts limits of the largest distances both ways, in percent of the diagonal, and of the number of
+/// shells.
 fn require(name: &str, target: &TriangleMesh, goal: ShellGoal, percent: f64, shells: usize) {
     let start = Instant::now();
     let report = FittedShells::new(target, goal, &|_| {}).unwrap().report;

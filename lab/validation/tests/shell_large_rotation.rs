@@ -1,6 +1,6 @@
-//! Large rotations of shells: the benchmarks of Sze, Liu and Lo (2004), FEAD 40:1551, each load step beside
-//! the printed table (`data/shell/large_rotation.json`), and the thesis's clamped plate far beyond small
-//! deflections.
+//! Large rotations of shells: the benchmarks of Sze, Liu and Lo (2004), FEAD 40:1551, and the thesis's
+//! clamped plate far beyond small deflections. Each load step of the benchmarks is compared with the printed
+//! table (`data/shell/large_rotation.json`).
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -22,8 +22,8 @@ fn table(name: &str) -> Vec<Vec<f64>> {
     reference("shell/large_rotation.json")[name]["rows"].as_array().unwrap().iter().map(numbers).collect()
 }
 
-/// Loads in the steps of a table; what is looked at beside its columns, the largest deviations over the last
-/// row's values.
+/// Loads in the steps of a table. Returns the two observed values at the end, and their largest deviations
+/// from the table's columns over the columns' largest values.
 fn follow(
     what: &str,
     specimen: &Specimen,
@@ -164,7 +164,7 @@ fn curved_hemisphere_in_large_rotation() {
     claim("curved hemisphere, all steps", off[0].max(off[1]), 0.05);
 }
 
-/// The same with 16 × 16 cells.
+/// Tests the curved hemisphere with 16 × 16 cells.
 #[test]
 #[ignore = "seconds"]
 fn curved_hemisphere_on_a_fine_mesh() {

@@ -13,7 +13,7 @@ use pliant_shells::element::{Bending, Formulation, Membrane};
 use pliant_validation::claim;
 use pliant_validation::shells::{CLAMPED, FLAT, renumbered};
 
-/// Prints a ratio beside the one expected and holds it to that within a tolerance.
+/// Prints a ratio and the expected ratio, and asserts that they agree within a tolerance.
 fn expect(what: &str, ratio: f64, expected: f64, tolerance: f64) {
     println!("{what}: {ratio:.4}, expected {expected:.3}");
     claim(what, (ratio - expected).abs(), tolerance);
@@ -43,10 +43,10 @@ fn timoshenko_clamped_plate() {
     }
 }
 
-/// Inner nodes moved at random by up to 0.3 of a cell, the centre left in its place: within 1 % of the
-/// regular mesh (1.030, 1.008, 1.002). The prototype moved the centre node too and took its deflection:
-/// 1.017, 1.007, 1.002. That is lower, as the node is no longer where the plate is lowest, and depends on the
-/// draw: here 1.016 to 1.036 at N = 8.
+/// Tests a plate whose inner nodes are moved at random by up to 0.3 of a cell. With the centre node in its
+/// place, the result is within 1 % of the regular mesh (1.030, 1.008, 1.002). The prototype moved the centre
+/// node too and took its deflection: 1.017, 1.007, 1.002. This is lower, as the plate is lowest at another
+/// place. It depends on the random numbers: here 1.016 to 1.036 at N = 8.
 #[test]
 fn clamped_plate_of_distorted_cells() {
     for (cells, regular) in [(8, 1.030), (16, 1.008), (32, 1.002)] {
@@ -67,7 +67,7 @@ fn clamped_plate_of_distorted_cells() {
     }
 }
 
-/// Numbers of nodes and first corners change nothing but round-off.
+/// The numbering of nodes and the first corners of triangles change only round-off.
 #[test]
 fn numbering_changes_no_deflection() {
     let mesh = plate_mesh(16, Pattern::Diagonal, Some(Distortion { amount: 0.2, seed: 3 }));
@@ -83,8 +83,9 @@ fn numbering_changes_no_deflection() {
     assert!((other / own - 1.0).abs() > 1e-3, "{own} {other}");
 }
 
-/// Uniform pressure on the curved surface (Jᵀ) against a third to each corner, clamped and simply supported
-/// (0.00406235 q L⁴/D): equally good on clamped plates, errors of opposite sign on supported ones.
+/// Compares uniform pressure on the curved surface (Jᵀ) with a third to each corner, on clamped and simply
+/// supported plates (0.00406235 q L⁴/D). They are equally good on clamped plates, and have errors of opposite
+/// sign on supported plates.
 #[test]
 fn timoshenko_plates_under_pressure() {
     let rows = [
@@ -161,7 +162,7 @@ fn cook_membrane() {
 }
 
 /// MacNeal and Harder's slender beam of 6 × 1 cells, square, trapezoidal and parallelogram, in the plane and
-/// out of it.
+/// out of the plane.
 #[test]
 fn straight_cantilever() {
     let rows = [
@@ -177,7 +178,7 @@ fn straight_cantilever() {
     }
 }
 
-/// MacNeal and Harder's twisted beam, thick and thin, in the plane and out of it.
+/// MacNeal and Harder's twisted beam, thick and thin, in the plane and out of the plane.
 #[test]
 fn twisted_beam() {
     let rows = [
@@ -199,9 +200,9 @@ fn twisted_beam() {
     }
 }
 
-/// The obstacle course with the curved membrane, which is the flat one on plates. The prototype has
-/// Scordelis-Lo 1.016 and 0.998 at N = 8 and 16, and the hemisphere 0.870, 0.961, 0.987 at 4, 8 and 16 on a
-/// mesh of its own, where the flat membrane differs by 0.005, too.
+/// The obstacle course with the curved membrane, which is the flat one on plates. The prototype gives 1.016
+/// and 0.998 for Scordelis-Lo at N = 8 and 16. For the hemisphere at 4, 8 and 16 it gives 0.870, 0.961 and
+/// 0.987, on another mesh. There the flat membrane differs by 0.005, too.
 #[test]
 fn the_obstacle_course_with_curved_membranes() {
     type Problem = fn(usize, Formulation) -> Result<f64, CaseError>;

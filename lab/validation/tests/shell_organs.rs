@@ -1,6 +1,6 @@
 //! Shells of real shapes, read through `PLIANT_DATA`: the leaflets of a patient's aortic valve closing under
-//! their pressure, an aneurysm and a rectum blown up. What is told: time, residual, and how far the answer
-//! moves with the mesh and with the numbering.
+//! their pressure, an aneurysm and a rectum blown up. The tests print the time, the residual, and the changes
+//! of the answer with the mesh and with the numbering.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -67,8 +67,8 @@ fn refined(mesh: &Mesh) -> Mesh {
     Mesh { points, blocks: vec![CellBlock::new(CellKind::Triangle, nodes)], ..Mesh::default() }
 }
 
-/// The longest edges of slivers, altitude below a twentieth of that edge, turned to the other diagonal where
-/// that is better; how many.
+/// Turns the longest edges of slivers to the other diagonal where this is better. A sliver has an altitude
+/// below a twentieth of that edge. Returns the number of turned edges.
 fn flip_slivers(mesh: &mut Mesh) -> usize {
     let mut cells = triangles(mesh);
     let sides = |[a, b, c]: [u32; 3]| [[a, b], [b, c], [c, a]];
@@ -219,7 +219,7 @@ fn largest(model: &Assembly, state: &State) -> f64 {
 }
 
 /// The largest difference of displacements over the largest displacement; `map` leads from a node of the
-/// first to that of the second.
+/// first to the same node of the second.
 fn apart(one: &(Assembly, State), other: &(Assembly, State), map: impl Fn(usize) -> usize) -> f64 {
     let differences = (0..one.0.rest.len())
         .map(|n| (one.1.displacement(&one.0, n) - other.1.displacement(&other.0, map(n))).norm());
@@ -257,7 +257,7 @@ fn rectum_under_pressure() {
     let Some(data) = data() else { return };
     let mesh = surface(data.join("organs-openhelp/Rectum_Lumen.stl"), 1e-3);
     let organ = Organ { young: 0.5e6, thickness: 3e-3, pressure: 3e3, membrane: FLAT.membrane };
-    // As it is, a pair of slivers of 0.2 mm folds over at 0.8 of the load; half of it is borne.
+    // Without repair, a pair of slivers of 0.2 mm folds over at 0.8 of the load; half of the load is borne.
     let failure = organ.equilibrium(&mesh).unwrap_err();
     assert!(failure.contains("folded over") || failure.contains("folds over"), "{failure}");
     study(&Organ { pressure: 1.5e3, ..organ }, &mesh);
@@ -285,7 +285,7 @@ fn table(path: PathBuf) -> Vec<(f64, f64)> {
 /// Longer than any edge of the leaflets [m].
 const EDGE: f64 = 4e-3;
 
-/// The distance [m] of a node from the nearest facet of another leaflet, if that is below a limit.
+/// The distance [m] of a node from the nearest facet of another leaflet, if it is below a limit.
 fn gap(model: &Assembly, state: &State, leaflet: &[usize], node: usize, limit: f64) -> f64 {
     let mut least = limit;
     let q = state.position[node];
@@ -311,14 +311,15 @@ fn gap(model: &Assembly, state: &State, leaflet: &[usize], node: usize, limit: f
     least
 }
 
-/// Leaflets of a patient's valve (E = 1 MPa, ν = 0.45, t = 0.4 mm, 1000 kg/m³, as their deck says in mm, g
-/// and s: pressures in Pa, damping 2/s), each fixed along the wall, under the pressure of the deck.
+/// Leaflets of a patient's valve, each fixed along the wall, under the pressure of their deck. E = 1 MPa, ν =
+/// 0.45, t = 0.4 mm, 1000 kg/m³ and a damping of 2/s are from the deck. The deck is in mm, g and s, so
+/// pressures are in Pa.
 struct Valve {
     model: Assembly,
     cells: Vec<[u32; 3]>,
-    /// Which leaflet each node is of.
+    /// Leaflet of each node.
     leaflet: Vec<usize>,
-    /// Nodes fixed to the wall, and those of free edges.
+    /// Nodes fixed to the wall, and nodes of free edges.
     held: Vec<u32>,
     free: Vec<u32>,
     notes: String,
@@ -335,7 +336,7 @@ fn valve(folder: &Path, fine: bool) -> Valve {
         let first = points.len() as u32;
         for (edge, nodes) in [("edge1", &mut held), ("edge2", &mut free)] {
             let line = surface(folder.join(format!("PAT003_07_{name}_{edge}.vtp")), 10e-3).points;
-            // Nodes of the edge, and the middles between two of them.
+            // Nodes of the edge, and the middles between two neighbours.
             let on_edge = |p: &Vector3| {
                 let near = |w: &Vector3| (w - p).norm() < 1e-6;
                 line.iter().any(near)
@@ -373,7 +374,7 @@ fn valve(folder: &Path, fine: bool) -> Valve {
 /// Thickness of a leaflet [m].
 const LEAFLET: f64 = 0.4e-3;
 
-/// Until two leaflets are a thickness apart.
+/// Moves the leaflets until two leaflets are a thickness apart.
 #[test]
 #[ignore = "minutes"]
 fn valve_leaflets_close() {
@@ -385,7 +386,7 @@ fn valve_leaflets_close() {
         let mut solver = BackwardEuler::new(model.clone(), DynamicSettings::new(step)).unwrap();
         let mut state = State::at_rest(&model);
         let start = Instant::now();
-        // Where the leaflets hang side by side on the wall they are close from the start.
+        // Leaflets that hang side by side on the wall are close from the start.
         let apart = |n: &usize| gap(&model, &state, &leaflet, *n, 2e-3) >= 2e-3;
         let free: Vec<usize> = (0..leaflet.len()).filter(apart).collect();
         let (mut parts, mut residual) = (0, 0.0_f64);
@@ -421,9 +422,9 @@ fn valve_leaflets_close() {
     );
 }
 
-/// The part of a grid of lines along the axis of the valve, within four fifths of the radius of its wall,
-/// that no leaflet is in the way of: each is half as thick on either side of its middle surface as two keep
-/// from each other [m].
+/// The part of a grid of lines along the axis of the valve that no leaflet blocks. The grid lies within four
+/// fifths of the radius of the wall. A leaflet has the thickness `apart` [m], the distance that two leaflets
+/// keep.
 fn leak(valve: &Valve, state: &State, apart: f64) -> f64 {
     let wall: Vec<Vector3> = valve.held.iter().map(|&n| state.position[n as usize]).collect();
     let centre = wall.iter().sum::<Vector3>() / wall.len() as f64;
@@ -471,7 +472,7 @@ fn leak(valve: &Valve, state: &State, apart: f64) -> f64 {
     f64::from(open) / f64::from(all)
 }
 
-/// After the pressure of the deck is highest, 13.03 kPa at 0.305 s [s].
+/// Time [s] after the peak of the deck's pressure, 13.03 kPa at 0.305 s.
 const PEAK: f64 = 0.32;
 
 /// In contact the leaflets close: they lie on each other along their free edges, let nothing through, and

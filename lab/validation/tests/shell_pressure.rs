@@ -1,7 +1,6 @@
 //! Pressure on thin curved walls, node by node: free cylinders, whole and a quarter of one, on regular and
-//! irregular meshes, and spheres. A cylinder that is free at its ends bends almost without stretching, so
-//! nodal forces that the true load has not show up R²/t² times as large. Lamé for a thin wall: u = p R²/(E
-//! t).
+//! irregular meshes, and spheres. A cylinder that is free at its ends bends almost without stretching. Its
+//! response therefore magnifies errors of nodal forces by R²/t². Lamé for a thin wall: u = p R²/(E t).
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -15,7 +14,7 @@ use pliant_validation::{Random, claim};
 
 const POISSON: f64 = 0.3;
 
-/// How a cylinder of radius 1 is cut up.
+/// Pattern of the triangles of a cylinder of radius 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Cut {
     Diagonal,
@@ -43,7 +42,7 @@ fn cylinder(cut: Cut, whole: bool, [round, along]: [usize; 2]) -> Mesh {
         let columns = if whole { round } else { round + 1 };
         let (i, j) = (number % columns, number / columns);
         let [turn, lift] = [(); 2].map(|()| 0.25 * random.number());
-        // Nodes that are held stay where they are.
+        // Held nodes keep their places.
         let free = if whole { j > 0 || 4 * i % round != 0 } else { i > 0 && i < round };
         let angle = step * (i as f64 + if free { turn } else { 0.0 });
         let z = height / along as f64 * (j as f64 + if j > 0 && j < along { lift } else { 0.0 });
@@ -60,7 +59,8 @@ fn cylinder(cut: Cut, whole: bool, [round, along]: [usize; 2]) -> Mesh {
     mesh
 }
 
-/// The cylinder under a pressure that strains it by 1e-6, held as it would stay by itself.
+/// The cylinder under a pressure that strains it by 1e-6, held only against rigid motions and at planes of
+/// symmetry.
 fn pressed(mesh: Mesh, whole: bool, thickness: f64, formulation: Formulation, spread: Spread) -> Specimen {
     let cylinder = Specimen::new(mesh, [1.0, POISSON], thickness, formulation).unwrap();
     let cylinder = if whole {
@@ -103,7 +103,7 @@ const DEFAULT: (Formulation, Spread) =
     (Formulation { membrane: CURVED, bending: Bending::Dkt }, Spread::Curved);
 const CURVED: Membrane = Membrane::Curved { adaptation: 10.0 };
 
-/// What a user of a quarter sees, by element and spread of the pressure.
+/// Prints the displacements of a quarter, by element and spread of the pressure.
 #[test]
 fn a_quarter_cylinder_before_and_after() {
     println!("u/exact at the nodes of a quarter, 10 x 7 cells, R/t = 25, 100, 1000");
@@ -147,8 +147,8 @@ fn a_free_cylinder_under_pressure_stays_round() {
             claim(&format!("cylinder, {cut:?}, t = {thickness}"), worst(cut, thickness), limit);
         }
     }
-    // The goal was 1.0 and 2.2 %, measured on one mesh; on twelve the prototype's formulas, in its axes, give
-    // 0.6 to 1.1 and 2.0 to 5.0 %.
+    // The reference values, from one mesh, are 1.0 and 2.2 %. On twelve meshes the prototype's formulas, in
+    // its axes, give 0.6 to 1.1 and 2.0 to 5.0 %.
     for (thickness, limit) in [(0.04, 0.012), (0.01, 0.055)] {
         let all: Vec<f64> = (1..=12).map(|seed| worst(Cut::Irregular(seed), thickness)).collect();
         let [least, most] = bounds(&all);
@@ -162,8 +162,8 @@ fn a_free_cylinder_under_pressure_stays_round() {
 }
 
 /// A8 of the acceptance tests of contact: a tube of r = 3 mm and t = 0.3 mm, E = 1 MPa, ν = 0.42, at 5 kPa.
-/// Thin walls widen by u = p r²/(E t) = 150 µm with open ends, by 1 − ν/2 of it with closed ones and by 1 −
-/// ν² in plane strain; around the tube the stress is p r/t = 50 kPa.
+/// Thin walls with open ends widen by u = p r²/(E t) = 150 µm. With closed ends they widen by (1 − ν/2) u, in
+/// plane strain by (1 − ν²) u. The stress around the tube is p r/t = 50 kPa.
 #[test]
 fn a_tube_widens_as_its_ends_allow() {
     let (radius, thickness, young, nu, pressure) = (3e-3, 3e-4, 1e6, 0.42, 5e3);
@@ -209,8 +209,8 @@ fn a_tube_widens_as_its_ends_allow() {
     }
 }
 
-/// A thousandth of the pressure moves the wall a thousandth as far: its own stiffness, 11 D/R³ at R/t = 1000,
-/// has no part in linear theory.
+/// A thousandth of the pressure moves the wall a thousandth as far. In linear theory the pressure's own
+/// stiffness, 11 D/R³ at R/t = 1000, has no effect.
 #[test]
 fn linear_theory_is_linear_in_the_pressure() {
     let (formulation, spread) = DEFAULT;
@@ -226,10 +226,10 @@ fn linear_theory_is_linear_in_the_pressure() {
     claim("linear theory, two pressures", apart, 1e-6);
 }
 
-/// R/t = 5000, where flat membranes find no equilibrium: strained by 1e-3 in one load step on regular meshes,
-/// also on a crossed one with edges of 11 √(R t), and by 1e-6 on an irregular one with edges of 2 √(R t), the
-/// longest that are advised. Strained by 1e-3, five times its thickness, the irregular one finds no
-/// equilibrium; nor do coarser irregular meshes.
+/// Tests R/t = 5000, where flat membranes find no equilibrium. Regular meshes are strained by 1e-3 in one
+/// load step, also a crossed mesh with edges of 11 √(R t). An irregular mesh with edges of 2 √(R t), the
+/// longest that are advised, is strained by 1e-6. At a strain of 1e-3, five times its thickness, the
+/// irregular mesh finds no equilibrium; nor do coarser irregular meshes.
 #[test]
 fn a_very_thin_cylinder_finds_its_equilibrium() {
     let (formulation, spread) = DEFAULT;
@@ -246,7 +246,7 @@ fn a_very_thin_cylinder_finds_its_equilibrium() {
     }
 }
 
-/// Radial displacements over Lamé's at a strain, after one load step with so many times the pressure.
+/// Radial displacements over Lamé's at a strain, after one load step with the pressure times `times`.
 fn blown_up(mut model: Assembly, times: f64, strain: f64) -> (Vec<f64>, Step) {
     let LoadKind::ShellPressure { pressure, .. } = &mut model.model_mut().loads[0].kind else {
         panic!("no pressure")
@@ -270,8 +270,8 @@ fn an_irregular_cylinder_is_blown_up_in_one_step() {
     claim("irregular cylinder, strain 1e-3", off(&found), 0.03);
 }
 
-/// Pressure p cos 2θ bends the wall into an oval: the displacement on a coarse mesh over that of one twice as
-/// fine. No cure of scatter may remove bending.
+/// Pressure p cos 2θ bends the wall into an oval. The test compares displacements on a coarse mesh and on a
+/// mesh twice as fine. No cure of scatter may remove bending.
 #[test]
 fn pressure_that_varies_bends_a_cylinder() {
     let oval = |[round, along]: [usize; 2], (formulation, spread): (Formulation, Spread)| {

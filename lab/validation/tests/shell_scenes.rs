@@ -1,6 +1,6 @@
-//! The benchmarks of shells as scene files (`scenes/shells/`), run as a user runs them, their tables read:
-//! the same references and tolerances as those of the library (`shell_linear.rs`, `shell_large_rotation.rs`).
-//! The prototype's numbers of curved walls are of `dkt-opt`.
+//! The benchmarks of shells as scene files (`scenes/shells/`). The tests run them as a user does and read
+//! their tables. References and tolerances are the same as in `shell_linear.rs` and
+//! `shell_large_rotation.rs`. The prototype's numbers of curved walls are for `dkt-opt`.
 
 use std::path::Path;
 
@@ -57,7 +57,7 @@ fn table(name: &str, changes: &[&str]) -> Table {
     Table { header, rows }
 }
 
-/// Prints a ratio beside the one expected and holds it to that within a tolerance.
+/// Prints a ratio and the expected ratio, and asserts that they agree within a tolerance.
 #[track_caller]
 fn expect(what: &str, ratio: f64, expected: f64, tolerance: f64) {
     println!("{what}: {ratio:.4}, expected {expected:.3}");
@@ -69,8 +69,8 @@ fn literature(name: &str) -> Vec<Vec<f64>> {
     reference("shell/large_rotation.json")[name]["rows"].as_array().unwrap().iter().map(numbers).collect()
 }
 
-/// The largest deviation of two columns, with signs, from the rows of a table of the literature at the
-/// instants of the run, over the largest values there.
+/// The largest deviation of two columns, with signs, from a table of the literature, over the table's largest
+/// values. Its rows are compared at the instants of the run.
 fn deviation(found: &Table, reference: &str, columns: [(&str, f64); 2]) -> f64 {
     let rows = literature(reference);
     let off = |c: usize| {
@@ -107,7 +107,7 @@ fn timoshenko_clamped_plate() {
     }
 }
 
-/// Inner nodes moved at random by up to 0.3 of a cell. The probe asks the flat triangle over the middle,
+/// Inner nodes moved at random by up to 0.3 of a cell. The probe reads the flat triangle over the middle,
 /// which lies above the nodes' deflections by up to w″h²/8 (0.002 at N = 32). Seeds 3 and 4 fold a triangle
 /// back (which is warned about), seed 5 makes a sliver of 3 % of its area.
 #[test]
@@ -268,8 +268,8 @@ fn hinged_roof_snaps_through() {
     }
 }
 
-/// By arc length it passes both limit points, and ends there when told to, at the load of the second; left
-/// alone it ends where the load is as written.
+/// By arc length the roof passes both limit points. With `stop` the run ends at the load of the second limit
+/// point; without it the run ends where the load is as written.
 #[test]
 fn hinged_roof_by_arc_length_ends() {
     let run = |stop: &str| {
@@ -302,8 +302,8 @@ fn the_plate_of_the_thesis_is_no_linear_case() {
     claim("q = 0.01: w/(0.126532 q)", (w / (0.126532 * 0.01) - 1.0).abs(), 0.01);
 }
 
-/// p = 2 E t/(1 − ν) (ΔR/R)/R for a thin sphere that grows by 0.8 % in radius; 2 % for flat triangles (R
-/// enters as that of a sphere of their volume) and for the wall that grows.
+/// p = 2 E t/(1 − ν) (ΔR/R)/R for a thin sphere that grows by 0.8 % in radius; 2 % for flat triangles and for
+/// the wall that grows. R is the radius of a sphere of the triangles' volume.
 #[test]
 fn a_balloon_takes_the_pressure_of_a_thin_sphere() {
     let found = table("balloon", &[]);

@@ -119,8 +119,8 @@ fn thesis_6_4_error_of_the_backward_euler_update_is_the_published_one() {
     );
 }
 
-/// A bound of the error of S from taking the elastic stress Φ as linear in each step: the update solves the
-/// rest exactly, hence |ΔS| = |a/τ ∫ e^(−(t−s)/τ) (Φ − Φ_linear) ds| ≤ a (1 − e^(−t/τ)) max|Φ″| Δt²/8.
+/// A bound of the error of S from taking the elastic stress Φ as linear in each step. The update solves the
+/// rest exactly. Hence |ΔS| = |a/τ ∫ e^(−(t−s)/τ) (Φ − Φ_linear) ds| ≤ a (1 − e^(−t/τ)) max|Φ″| Δt²/8.
 fn truncation_bound(case: Case, component: usize, rate: f64, shear: f64) -> f64 {
     let h = 1e-4;
     let stress = |shear: f64| case.elastic(shear).isochoric.0[component];

@@ -81,7 +81,7 @@ fn the_limit_of_a_cell_alone_is_exact_on_147_random_states_of_every_kind_of_law(
         for (name, law) in laws() {
             let model = single(cells, law);
             let at_rest = homogeneous(&model, &Tensor::ZERO);
-            // With a limit of the assembly of almost nothing the cell counts alone.
+            // With an almost zero limit of the assembly, only the cell counts.
             let monitor = Monitor::new(&model, 1e-9, OnUnstable::Report);
             let (mut worst, mut least) = (0.0, f64::INFINITY);
             let rest = assembled_at(&model, &at_rest).unwrap().step;
@@ -118,8 +118,8 @@ fn pressed(law: AnyLaw, element: (VolumeCell, Tets, Hexes)) -> Specimen {
     cube
 }
 
-/// The estimate over the critical time step of the deformed states of a run: the least and the largest, and
-/// the largest over what looking closely at every cell gives.
+/// Ratios of the estimate to the critical time step in the deformed states of a run: the least and the
+/// largest. The third is the largest ratio to the estimate from a close look at every cell.
 fn estimates(what: &str, specimen: &Specimen, until: f64) -> [f64; 3] {
     let model = &specimen.model;
     let (limit, at_rest) = (specimen.critical_step(), vec![[0.0; 3]; model.node_count()]);
@@ -151,9 +151,9 @@ fn the_estimate_stays_within_its_reserve_of_the_critical_step_of_deformed_bodies
     let uniform = Hexes::UniformStrain(HOURGLASS);
     let averaged = Tets::Averaged(Averaging::Nodal);
     for (name, law) in laws() {
-        // What is kept in reserve for it. Fibres that carry tension only are half stiff at rest, between two
-        // slopes, and no limit found there knows the full one: for them the rest of 0.9 of the limit at rest
-        // must do.
+        // Reserve of the estimate. Fibres that carry tension only are half stiff at rest, between two slopes,
+        // so a limit found at rest misses their full stiffness. For these fibres 0.9 of the limit at rest has
+        // to be enough.
         let allowed = if name == "holzapfel-gasser-ogden" { 1.0 / 0.9 } else { 1.0 / KEEP };
         for cells in CELLS {
             let gravity = 9.81 * law.small_strain().shear / 1000.0;
@@ -211,7 +211,7 @@ fn soft_tissue_stretched_by_38_percent_survives_at_0_9_of_the_critical_step_only
         };
         let size = largest(fine.iter().map(|(_, u)| u.abs()));
         let off = largest(course.iter().map(|&(time, u)| (u - at(time)).abs())) / size;
-        // Half of what the step error of the slowest vibrations makes of the phase within their first period.
+        // Half of the phase error of the slowest vibrations within their first period.
         claim(&format!("{cells:?}: the tip's course, off by"), off, 0.01);
     }
 }
@@ -239,7 +239,7 @@ fn below_the_step_a_run_can_stop_or_just_report() {
 #[test]
 fn a_limit_below_a_hundredth_of_the_step_ends_the_run() {
     let block = hanging(soft_tissue(), VolumeCell::Tet, 9.81);
-    // Nobody is asked for the critical time step when a run begins above it.
+    // The critical time step is not computed if a run begins above it.
     let monitor = Monitor::new(&block.model, 1e-7, OnUnstable::Substep);
     let step = 500.0 * block.critical_step();
     let stepper = CentralDifference::new(block.model.clone(), step).unwrap().watched(monitor);
@@ -247,7 +247,7 @@ fn a_limit_below_a_hundredth_of_the_step_ends_the_run() {
     assert!(matches!(ended, Some(StepError::BelowLimit { .. })), "{ended:?}");
 }
 
-/// Relaxing liver, damped, swinging so that its steps are cut and made whole again.
+/// Relaxing liver, damped, swinging so that its steps are cut and restored.
 fn swinging() -> Specimen {
     let parameters = json!({ "shear-modulus": 6568.0, "bulk-modulus": 63_490.0, "exponent": 4.0 });
     let material =
@@ -273,7 +273,8 @@ fn cut_steps_have_the_same_bits_on_any_number_of_threads_and_after_a_restart() {
     assert!(alone.stability.cuts > 0 && alone.stability.critical_steps > 0, "the test needs changes");
     assert!(alone == on(2) && alone == on(8));
 
-    // A copy of the state, taken anywhere between two instants, goes on alike on a stepper of its own.
+    // A copy of the state, taken anywhere between two instants, continues with the same bits on a stepper of
+    // its own.
     for parts in [40_u32, 97, 131] {
         let (mut stepper, mut state) = (fresh(), State::at_rest(&block.model));
         for _ in 0..parts {
@@ -291,7 +292,7 @@ fn cut_steps_have_the_same_bits_on_any_number_of_threads_and_after_a_restart() {
 
 #[test]
 fn a_free_fall_in_cut_steps_is_exact() {
-    // Nothing holds it: after steps of any lengths x = ½ g t².
+    // The block is free: after steps of any lengths x = ½ g t².
     let block = Specimen::block([0.1; 3], [2; 3], VolumeCell::Hex, &elastic(soft_tissue()), [0.0; 3])
         .falling([0.0, 0.0, -9.81]);
     let limit = block.critical_step();

@@ -98,15 +98,15 @@ fn distorted_block(cells: VolumeCell) -> Mesh {
     mesh
 }
 
-/// On rollers, free to widen, with damping near critical for the slowest vibration, a shear wave between a
-/// held and a free face: ω = π/2 √(μ/ρ)/L.
+/// Makes a block on rollers, free to widen. Damping is near critical for the slowest vibration, a shear wave
+/// between a held and a free face: ω = π/2 √(μ/ρ)/L.
 fn specimen(tissue: &Tissue, cells: VolumeCell) -> Specimen {
     let slowest = std::f64::consts::FRAC_PI_2 * (tissue.law.small_strain().shear / 1000.0).sqrt() / EDGE;
     let material = elastic(tissue.law);
     Specimen::new(distorted_block(cells), &material, tissue.fibre).on_rollers().damped(2.0 * slowest)
 }
 
-/// Far below the bound at rest, which the shrunken cells of a strong compression undercut.
+/// A step far below the bound at rest, since cells shrunken by a strong compression have smaller limits.
 fn careful_step(specimen: &Specimen) -> f64 {
     0.3 * specimen.element_bound()
 }
@@ -132,7 +132,8 @@ fn moved_block_on_rollers_widens_and_reacts_as_the_exact_solution() {
 #[test]
 fn dead_traction_of_the_nominal_stress_stretches_the_block_as_the_exact_solution() {
     for tissue in tissues() {
-        // Stretches 0.9 and 1.4: under a stronger dead compression the block, its top free to tilt, buckles.
+        // Stretches 0.9 and 1.4: under a stronger dead load in compression the block buckles, since its top
+        // is free to tilt.
         for (cells, row) in ELEMENTS.iter().flat_map(|e| [(*e, tissue.table[15]), (*e, tissue.table[39])]) {
             let specimen = specimen(&tissue, cells);
             let forces = traction(&specimen, "x-max", row[3]);

@@ -7,12 +7,12 @@ use pliant_sim::Simulation;
 
 use crate::status::{Fault, PliantStatus};
 
-/// What a program holds.
+/// Grips of a program.
 #[derive(Default)]
 pub(crate) struct Held {
     /// Grips by their number.
     grips: BTreeMap<u32, Grip>,
-    /// The number of the next one: those of grips that were released are not used again.
+    /// Number of the next grip: numbers of released grips are not used again.
     next: u32,
 }
 

@@ -1,4 +1,4 @@
-//! What a program has open.
+//! Open items of a program.
 
 mod field;
 mod held;

@@ -8,7 +8,7 @@ use pliant_scene::World;
 
 use crate::status::Fault;
 
-/// A scene before a simulation is made of it.
+/// A scene that a program can still change; simulations are made from it.
 pub(crate) struct OpenScene {
     pub(crate) source: Source,
     folder: PathBuf,

@@ -12,7 +12,7 @@ use super::surface::OpenSurface;
 use crate::lock::lock;
 use crate::status::{Fault, PliantStatus};
 
-/// What threads share of a simulation: one of them runs it, any of them stops it.
+/// The part of a simulation that threads share: one thread runs it, any thread stops it.
 pub(crate) struct Shared {
     running: Mutex<Running>,
     pub(crate) stopped: StopFlag,
@@ -40,7 +40,7 @@ impl Shared {
     }
 }
 
-/// A simulation with what the program has asked of it.
+/// A simulation with its open surfaces, fields and grips.
 pub(crate) struct Running {
     pub(crate) world: Arc<World>,
     pub(crate) simulation: Simulation,
@@ -58,7 +58,7 @@ impl Running {
         pool.install(|| what(&mut Computing { world, simulation, fields }))
     }
 
-    /// Whether the state lies on a GPU.
+    /// True if the state lies on a GPU.
     fn is_on_device(&self) -> bool {
         #[cfg(feature = "gpu")]
         return self.world.device().is_some();
@@ -85,7 +85,7 @@ impl Running {
     }
 }
 
-/// What is computed with on the threads of a simulation.
+/// Data for computing on the threads of a simulation.
 pub(crate) struct Computing<'r> {
     pub(crate) world: &'r Arc<World>,
     pub(crate) simulation: &'r mut Simulation,

@@ -5,9 +5,9 @@ use pliant_run::Skin;
 /// A surface with places and normals of its vertices.
 pub(crate) struct OpenSurface {
     pub(crate) skin: Skin,
-    /// Those that were lent: they change when they are lent again.
+    /// Lent vertices: they change when the surface is lent again.
     pub(crate) lent: Vertices,
-    /// Those that normals are copied from.
+    /// Vertices that normals are copied from.
     pub(crate) own: Vertices,
 }
 

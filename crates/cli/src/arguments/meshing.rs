@@ -82,7 +82,7 @@ pub struct MeshImage {
     #[arg(long, value_name = "TABLE")]
     pub names: Option<PathBuf>,
     /// Instead of labels: all voxels with at least this value, for example in a probability map; with several
-    /// masks, in each of them.
+    /// masks, the voxels of each mask.
     #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
     pub threshold: Option<f64>,
     /// Edge of the cells: 0.008 in metres, or 8mm. Tets and hexes need it; a surface gets even triangles of
@@ -119,8 +119,9 @@ pub struct MeshImage {
     /// point data.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["edge", "triangles"])]
     pub error_map: Option<PathBuf>,
-    /// Type of mesh: tetrahedra optimised for long stable steps, cubes with a stepped surface, all cubes that
-    /// the body touches with the fraction that it fills (cell data `fraction`), a surface, or curved shells.
+    /// Type of mesh: tetrahedra optimised for long stable steps, cubes with a stepped surface, immersed
+    /// cubes, a surface, or curved shells. Immersed cubes are all cubes that the body touches, with the
+    /// fraction that it fills (cell data `fraction`).
     #[arg(long = "as", value_name = "CELLS", default_value = "tets")]
     pub cells: MeshCells,
     /// In a scene: a label whose surface is a wall of that thickness, tied to the tissue, such as "portal
@@ -130,8 +131,8 @@ pub struct MeshImage {
     /// In a scene: a capsule of this thickness on the boundary of the tissue, such as 0.1mm.
     #[arg(long, value_name = "LENGTH", value_parser = wall, allow_hyphen_values = true)]
     pub capsule: Option<f64>,
-    /// Name of the mesh: .vtu or .msh, for a surface also .ply, .obj or .stl; or .toml for a scene of the
-    /// image, with walls and ties.
+    /// Name of the mesh: .vtu or .msh, for a surface also .ply, .obj or .stl. A name with .toml makes a scene
+    /// of the image, with walls and ties.
     #[arg(short, long, value_name = "FILE")]
     pub out: PathBuf,
     /// Close gaps and channels up to this width, or holes of a surface: 0.003 in metres, or 3mm. Holes of a

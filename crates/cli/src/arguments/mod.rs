@@ -74,7 +74,7 @@ pub enum Command {
     Import {
         /// A NiftySim model (XML).
         model: PathBuf,
-        /// Folder for the scene and its meshes, or name of the scene file (.toml) with the meshes beside it.
+        /// Folder for the scene and its meshes, or name of the scene file (.toml) with the meshes next to it.
         #[arg(short, long, value_name = "DIR|FILE")]
         out: PathBuf,
         /// Translate a model with unsupported parts (shells that bend, radii that change) without these
@@ -155,7 +155,7 @@ pub struct Haptics {
     /// A hand pulls a simulated device along the trace, so that it gives way to the force.
     #[arg(long, requires = "replay")]
     pub hand: bool,
-    /// Where devices send their poses; port 0 for a free one.
+    /// Address to which devices send their poses; port 0 for a free one.
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:4270", conflicts_with = "replay")]
     pub listen: std::net::SocketAddr,
     /// Allow an address that other machines reach: anyone there can move the tool.
@@ -306,10 +306,10 @@ pub struct Sweep {
     #[arg(long)]
     pub force: bool,
     /// Run only every N-th combination from the I-th on, and append rows to rows-I-of-N.jsonl in the folder:
-    /// for job arrays. The same command again runs what is missing.
+    /// for job arrays. The same command again runs the missing combinations.
     #[arg(long, value_name = "I/N", conflicts_with_all = ["force", "dry_run", "merge"])]
     pub part: Option<SweepPart>,
-    /// Put the rows of all parts in the folder together into the table, and name what is missing.
+    /// Put the rows of all parts in the folder together into the table, and name the missing combinations.
     #[arg(long, conflicts_with_all = ["force", "dry_run"])]
     pub merge: bool,
     /// Check and list the combinations without running or writing anything.
@@ -347,10 +347,10 @@ pub(crate) struct Info {
     /// Write the mesh in another format, selected by the file extension.
     #[arg(long, value_name = "FILE")]
     pub convert: Option<PathBuf>,
-    /// Also measure the distance between this surface and that of another mesh, in both directions.
+    /// Also measure the distance between this surface and the surface of another mesh, in both directions.
     #[arg(long, value_name = "OTHER")]
     pub against: Option<PathBuf>,
-    /// Factor on all lengths of the other mesh; by default that of `--scale`.
+    /// Factor on all lengths of the other mesh; by default the factor of `--scale`.
     #[arg(long, value_name = "FACTOR", requires = "against", allow_negative_numbers = true)]
     pub against_scale: Option<f64>,
     /// Print one JSON object on standard output.

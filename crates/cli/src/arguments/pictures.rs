@@ -135,7 +135,7 @@ pub struct Render {
     /// `element-step` on the cells of its series.
     #[arg(long)]
     pub critical: bool,
-    /// Do not mark the largest value that the colours tell. A ring marks it, dashed where something hides the
+    /// Do not mark the largest value that the colours show. A ring marks it, dashed where something hides the
     /// place.
     #[arg(long)]
     pub no_maximum: bool,
@@ -151,7 +151,7 @@ pub struct Render {
     /// Series of a finished run; by default the first in alphabetical order.
     #[arg(long, value_name = "NAME")]
     pub series: Option<String>,
-    /// Simulated time between frames of a scene [s]; by default that of its first series, otherwise a
+    /// Simulated time between frames of a scene [s]; by default the interval of its first series, otherwise a
     /// hundredth of the run.
     #[arg(long, value_name = "S", value_parser = factor)]
     pub every: Option<f64>,
@@ -159,7 +159,7 @@ pub struct Render {
     pub overrides: Overrides,
 }
 
-/// Which frames of a series.
+/// Choice of frames of a series.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Frames {
     All,

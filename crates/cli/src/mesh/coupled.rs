@@ -12,7 +12,7 @@ use crate::SUCCESS;
 use crate::arguments::{MeshCells, MeshImage};
 use crate::report::{Bar, Failure, say};
 
-/// Whether the output is a scene.
+/// True if the output is a scene.
 pub(crate) fn is_scene(arguments: &MeshImage) -> bool {
     arguments.out.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
 }
@@ -118,7 +118,7 @@ fn with_vessels(
     Ok((filled, Some(voxels.map(|voxels| voxels as f64 * image.grid.voxel_volume()))))
 }
 
-/// Corners of the box that holds all but one in two hundred of the places at either end of each axis: loose
+/// Corners of a box around most places: along each axis one in two hundred is left out at either end. Loose
 /// voxels do not count.
 fn bulk(places: Vec<Vector3>) -> Option<[Vector3; 2]> {
     let last = places.len().checked_sub(1)?;
@@ -132,20 +132,20 @@ fn bulk(places: Vec<Vector3>) -> Option<[Vector3; 2]> {
     Some(bounds)
 }
 
-/// Where organ and vessels come from.
+/// Sources of organ and vessels.
 struct Sources<'a> {
-    /// What the organ is chosen by in the input.
+    /// Labels that choose the organ in the input.
     organ: Vec<LabelChoice>,
     /// Its files, and its labels as the keys of a scene.
     files: Vec<&'a PathBuf>,
     labels: String,
-    /// The same of each vessel.
+    /// Files and labels of each vessel.
     vessels: Vec<(Vec<&'a PathBuf>, String)>,
 }
 
 impl<'a> Sources<'a> {
-    /// Of one image the tissue takes the voxels of the vessels inside of it; masks overlap, and each stands
-    /// for itself.
+    /// Finds the sources. In one image the tissue takes the voxels of the vessels inside; masks overlap, and
+    /// each is a source by itself.
     fn of(arguments: &'a MeshImage) -> Result<Self, Failure> {
         let vessels = || arguments.vessels.iter().map(|(label, _)| label);
         if arguments.masks.is_empty() {
@@ -203,13 +203,13 @@ impl<'a> Sources<'a> {
     }
 }
 
-/// The name of a mask: that of its file, without endings.
+/// Name of a mask: the name of its file, without endings.
 fn stem(file: &Path) -> String {
     let name = file.file_name().unwrap_or_default().to_string_lossy();
     name.split_once('.').map_or(&*name, |(stem, _)| stem).to_owned()
 }
 
-/// A label as a scene has it: a number, a text in quotes, or a key with several of these.
+/// A label as a scene writes it: a number, a text in quotes, or a key with several labels.
 fn typed(label: &LabelChoice) -> String {
     let quoted = |text: String| serde_json::Value::from(text).to_string();
     match label {
@@ -262,7 +262,7 @@ fn from_folder(path: &Path, folder: &Path) -> PathBuf {
     }
 }
 
-/// What a scene is called: the name of its folder if it is a `scene.toml`, else its own.
+/// Name of a scene: the name of its folder if the file is a `scene.toml`, else the file's name.
 fn folder_name(out: &Path) -> String {
     let stem = out.file_stem().unwrap_or_default();
     let folder = out.parent().and_then(Path::file_name).filter(|_| stem == "scene");

@@ -59,7 +59,7 @@ impl Source<'_> {
     }
 }
 
-/// Whether the input is a mesh file, by its extension or its first bytes.
+/// True if the input is a mesh file, by its extension or its first bytes.
 pub(crate) fn is_mesh_file(arguments: &MeshImage) -> bool {
     Format::of_file(&arguments.image).is_some()
 }
@@ -183,7 +183,7 @@ pub(crate) fn regions_in(mut image: Image, arguments: &MeshImage, bar: &Bar) -> 
     Ok(Segmented { labels: cut.labels, chosen: cut.chosen, names, protect, voxel, lines, object, warnings })
 }
 
-/// Labels with smaller cells from the command line, as numbers among those of the cells.
+/// Labels with smaller cells from the command line, as numbers among the labels of the cells.
 pub fn protected(
     arguments: &MeshImage,
     labels: &[i32],
@@ -243,7 +243,7 @@ pub(crate) fn label_failure(error: &LabelError) -> Failure {
 
 pub(crate) fn meshing_failure(error: &MeshingError, force: bool) -> Failure {
     if let MeshingError::OpenSurface { widest, .. } = error {
-        // In whole millimetres, or in tenths of them.
+        // The width is a multiple of whole or tenth millimetres.
         let unit = if *widest > 1e-3 { 1e-3 } else { 1e-4 };
         let width = number((1e3 * unit * (widest / unit * (1.0 + 1e-9)).ceil() * 1e6).round() / 1e6);
         let help = format!(

@@ -325,7 +325,7 @@ fn require_few(arguments: &MeshImage, edge: f64, volume: f64) -> Result<(), Fail
 /// The cells of each kind with their report.
 enum Cells {
     Tets(Box<TetReport>),
-    /// Whether fractions weight them; loose parts dropped, and their cells; their boundary.
+    /// Hexes: true if fractions weight them; numbers of dropped loose parts and cells; their boundary.
     Hexes {
         immersed: bool,
         dropped: [usize; 2],

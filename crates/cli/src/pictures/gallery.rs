@@ -1,6 +1,6 @@
-//! `pliant render`, also of all scenes: a page with one of each, and the pictures that a folder lists, made
-//! anew where they do not fit their scenes. Files keep no times that last, so a picture has a hash of the
-//! scene and the options that it was made of.
+//! `pliant render`, also for all scenes: a page with a picture of each, and the pictures that a folder lists.
+//! Pictures that do not fit their scenes are made anew. File times do not last, so each picture has a hash of
+//! its scene and options.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -16,8 +16,8 @@ use crate::arguments::{Arguments, Command, Render};
 use crate::report::{Failure, say};
 use crate::signals;
 
-/// Draws what a command line names; of a folder of scenes it makes a page, or the pictures that the folder
-/// lists.
+/// Draws the scene, run or file of a command line. For a folder of scenes it makes a page, or the pictures
+/// that the folder lists.
 pub fn render(arguments: &Render) -> Result<u8, Failure> {
     let film = arguments.film.as_deref().map(film_kind).transpose()?;
     if arguments.gallery {
@@ -27,7 +27,7 @@ pub fn render(arguments: &Render) -> Result<u8, Failure> {
     if scenes.is_empty() { draw(arguments, film) } else { page(arguments, &scenes) }
 }
 
-/// The list of pictures in a folder of scenes, and what they were made of.
+/// The list of pictures in a folder of scenes, and the hashes of their sources.
 const LIST: &str = "gallery.txt";
 const SUMS: &str = "gallery.sums";
 
@@ -66,7 +66,7 @@ fn entries(folder: &Path) -> Result<(Vec<Entry>, Sha256), Failure> {
     Ok((entries, look))
 }
 
-/// Adds the files of a folder to a hash, but for those of some endings.
+/// Adds the files of a folder to a hash, without files of some endings.
 fn add_files(hash: &mut Sha256, folder: &Path, without: &[&str]) -> Result<(), Failure> {
     let listed = fs::read_dir(folder).map_err(|error| {
         Failure::plain(format!("`{}`: {error}", folder.display()), format!("mend the list `{LIST}`"))
@@ -122,7 +122,7 @@ impl Entry {
     }
 }
 
-/// What pictures were made of, and their own hashes, by their file.
+/// Hashes of each picture's sources and of the picture, by its file.
 fn sums(folder: &Path) -> BTreeMap<String, [String; 2]> {
     let text = fs::read_to_string(folder.join(SUMS)).unwrap_or_default();
     let line = |line: &str| {
@@ -139,8 +139,8 @@ fn hash_of(file: &Path) -> Option<String> {
     Some(hex(hash))
 }
 
-/// Pictures that are not made of what the list has now, or that are other files than were made; each with the
-/// hash of what it is made of.
+/// Returns pictures whose sources have changed, or whose files are not the ones that were made. Each comes
+/// with the hash of its sources.
 fn outdated(folder: &Path) -> Result<Vec<(Entry, String)>, Failure> {
     let sums = sums(folder);
     let mut old = Vec::new();
@@ -266,7 +266,7 @@ mod tests {
         assert_eq!(command.film.as_deref(), Some(Path::new("scenes/../docs/a.png")));
     }
 
-    /// Where this fails, make the pictures anew: `pliant render scenes --gallery`.
+    /// After a failure of this test make the pictures anew: `pliant render scenes --gallery`.
     #[test]
     fn pictures_of_this_repository_fit_their_scenes() {
         let old = outdated(&repository().join("scenes")).unwrap();
@@ -319,8 +319,8 @@ mod tests {
         assert_ne!(source(), before);
     }
 
-    /// All pictures that texts show are listed, but those of the window and of data that is not here; and so
-    /// is each scene.
+    /// Each scene is listed, and so are the pictures that texts show. Pictures of the window and of missing
+    /// data are exceptions.
     #[test]
     fn pictures_in_texts_are_listed() {
         let (listed, _) = entries(&repository().join("scenes")).unwrap();

@@ -142,7 +142,7 @@ pub(super) fn draw(arguments: &Render, film: Option<FilmKind>) -> Result<u8, Fai
     Ok(if shown.failed { 1 } else { code })
 }
 
-/// What the view of a scene hides, and what has a look of its own.
+/// Regions that the view of a scene hides, or shows with a look of their own.
 fn regions_of_scene(world: &World) -> Regions {
     let view = &world.scene.view;
     regions_of(view, &world.region_names(view.on.as_deref()))
@@ -261,12 +261,12 @@ pub(super) fn run_scene(path: &Path, arguments: &Render) -> Result<Option<Shown>
     Ok(Some(Shown { look, series, title: scene.scene.title.clone(), failed, _space: space }))
 }
 
-/// Whether a path is the folder of a run, not of a scene.
+/// True if a path is the folder of a run, not of a scene.
 pub(super) fn is_folder_of_run(path: &Path) -> bool {
     path.is_dir() && !path.join("scene.toml").exists()
 }
 
-/// Whether options change how a scene runs.
+/// True if options change how a scene runs.
 fn changes_a_run(arguments: &Render) -> bool {
     let changes = &arguments.overrides;
     !changes.set.is_empty()
@@ -276,7 +276,7 @@ fn changes_a_run(arguments: &Render) -> bool {
         || changes.device.is_some()
 }
 
-/// Whether options choose instants.
+/// True if options choose instants.
 fn changes_time(arguments: &Render) -> bool {
     arguments.film.is_some() || arguments.frames.is_some() || arguments.overrides.until.is_some()
 }

@@ -1,5 +1,6 @@
-//! Bad input of scenes in contact by a barrier, through the real binary: each has an answer, by the rows of
-//! the table of the contact specification (9.4), and none ends in a panic or writes a number that is none.
+//! Bad input of scenes in contact by a barrier, through the real binary. Each has an answer, by the rows of
+//! the table of the contact specification (9.4). No run ends in a panic or writes a number that is not
+//! finite.
 
 use crate::support::{CORNERS, Said, TETS, Workshop, changed, vtk};
 
@@ -81,8 +82,8 @@ fn good_input_is_run() {
     accepted(&shell(), &square(), &[]);
 }
 
-/// Rows 1, 7, 9 and 10: elements that are inverted, flat or listed twice, nodes without elements or at one
-/// place, edges of three triangles, slivers.
+/// Rows 1, 7, 9 and 10: inverted, flat and repeated elements, nodes without elements or at one place, edges
+/// of three triangles, slivers.
 #[test]
 fn meshes_that_cannot_touch_are_refused_with_their_elements() {
     let mut inverted = TETS;
@@ -132,7 +133,7 @@ fn meshes_that_cannot_touch_are_refused_with_their_elements() {
     );
 }
 
-/// Rows 3 and 6: numbers that are none, and numbers out of their ranges.
+/// Rows 3 and 6: numbers that are not finite, and numbers out of their ranges.
 #[test]
 fn numbers_that_cannot_be_are_refused_with_their_ranges() {
     let points: Vec<[f64; 3]> =
@@ -207,8 +208,8 @@ fn states_that_cannot_begin_are_refused_with_their_places() {
     );
 }
 
-/// Rows 2, 12, 14 and 15: what cannot go on ends with exit code 1 and the reason, and what was written before
-/// has no edge in a triangle and no number that is none.
+/// Rows 2, 12, 14 and 15: a run that cannot continue ends with exit code 1 and the reason. Its earlier output
+/// has no edge in a triangle, and only finite numbers.
 #[test]
 fn what_cannot_go_on_ends_with_its_last_state() {
     let output = "[output.organ]\ntype = \"vtu\"\nevery = 0.05\n";

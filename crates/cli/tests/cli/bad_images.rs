@@ -96,8 +96,8 @@ fn a_series_with_slices_missing_or_mixed_is_refused() {
     assert_refused(&workshop, "none", &["none"]);
 }
 
-/// More than 2 GiB of voxels are refused by what the header says; `--force` goes on, here to the end of a
-/// file that has none of them.
+/// More than 2 GiB of voxels are refused by the header alone; with `--force` reading continues, here to the
+/// end of a file without voxels.
 #[test]
 fn images_of_more_than_two_gigabytes_ask_for_force() {
     let workshop = Workshop::new(BLOCK);

@@ -43,7 +43,7 @@ fn every_mistake_is_underlined_on_standard_error() {
     ];
     assert_refused(&workshop, &["densty = 1000"], &says);
     assert_refused(&workshop, &["until = -1"], &says);
-    // What is doubted is said, and no reason to stop.
+    // Doubtful values give a warning, and do not stop the run.
     let output = Workshop::block("density = 1000", "density = 1e-6").pliant(&["check", "case"]);
     assert_eq!(output.code, 0, "{}", output.err);
     assert!(output.words().contains("is that so?") && output.underlines("density = 1e-6"), "{}", output.err);
@@ -133,7 +133,7 @@ fn assert_disk_full(output: &Said, file: &str, reason: &str) {
     }
 }
 
-/// All files under a folder that a killed or failed write would leave.
+/// Lists files under a folder that a killed or failed write would leave.
 fn halves(folder: &Path) -> Vec<String> {
     let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     let names = entries.flat_map(|path| match path.is_dir() {
@@ -143,8 +143,8 @@ fn halves(folder: &Path) -> Vec<String> {
     names.filter(|name| name.ends_with(".tmp")).collect()
 }
 
-/// Runs the scene with a limit on the file size in blocks of 512 or 1024 bytes, so that writing fails as on a
-/// full disk.
+/// Runs the scene with a limit on the file size, in blocks of 512 or 1024 bytes. Writing fails as on a full
+/// disk.
 #[cfg(unix)]
 fn run_limited(workshop: &Workshop, blocks: u32, trap: &str) -> Said {
     let limited = format!("{trap} ulimit -f {blocks}; exec \"$0\" run case --force --json");

@@ -1,4 +1,4 @@
-//! GPUs through the real binary: the list of them, and what is said where there is none.
+//! GPUs through the real binary: their list, and the error without a GPU.
 
 use crate::support::{BLOCK, Said, Workshop, changed, has_gpu};
 

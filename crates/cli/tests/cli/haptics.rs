@@ -1,4 +1,4 @@
-//! `pliant haptics` through the real binary. Times are those of a busy machine: none is checked.
+//! `pliant haptics` through the real binary. The machine may be busy, so no time is checked.
 
 use crate::support::Workshop;
 

@@ -1,5 +1,5 @@
-//! Labels by name, and pictures of labels, through the real binary: a segmentation with names becomes a mesh
-//! that keeps them, values and selections of a scene go by name, and pictures show and hide labels.
+//! Labels by name, and pictures of labels, through the real binary. A segmentation with names becomes a mesh
+//! that keeps them. Values and selections of a scene use the names, and pictures show and hide labels.
 
 use pliant_geometry::{Labels, io};
 use pliant_testing::image_files::layered_segmentation;
@@ -45,7 +45,7 @@ mod with_pictures {
     use super::*;
     use crate::support::has_gpu;
 
-    /// Pixels with the exact colour of a label: those of its swatch.
+    /// Pixels with the exact colour of a label: the pixels of its swatch.
     fn swatches(workshop: &Workshop, file: &str) -> [usize; 4] {
         let picture = Picture::from_png(&fs::read(workshop.path(file)).unwrap()).unwrap();
         [0, 1, 2, 3]

@@ -1,5 +1,5 @@
 //! The real binary: words, exit codes, files. Tests that need a simulation alone are in `crates/run/tests`.
-//! One program for all files here, so that they are linked once; run those of a file with
+//! One program holds all files here, so that they are linked once; run the tests of a file with
 //! `cargo test -p pliant --test cli running::`.
 
 mod bad_contact;

@@ -33,7 +33,7 @@ fn an_image_becomes_a_scene_with_walls_and_ties() {
     let output = mesh(&workshop, &[&more[..], &["-o", "organ/scene.toml"]].concat());
     assert_eq!(output.code, 0, "{}", output.err);
     assert!(output.out.contains("wrote organ/scene.toml"), "{}", output.out);
-    // The core is inside of the ball, all of it.
+    // The whole core is inside the ball.
     assert!(output.out.contains("1.47 ml of the vessels; 0.00 ml of these run outside"), "{}", output.out);
     let text = workshop.read("organ/scene.toml");
     for piece in [

@@ -80,8 +80,8 @@ fn put(workshop: &Workshop, name: &str, mesh: &Mesh) {
     }
 }
 
-/// Runs `pliant mesh NAME --scale 0.001 --edge 5mm -o out.vtu --json …`; what follows comes in place of
-/// these.
+/// Runs `pliant mesh NAME --scale 0.001 --edge 5mm -o out.vtu --json …`; options in `more` replace the usual
+/// ones.
 fn mesh(workshop: &Workshop, name: &str, more: &[&str]) -> Said {
     let usual = [["--scale", "0.001"], ["--edge", "5mm"]];
     let missing = usual.iter().filter(|option| !more.contains(&option[0])).flatten().copied();

@@ -146,7 +146,7 @@ mod with_pictures {
         assert_eq!(take("again", &["--camera", "20,22"]), plain);
         let surface = take("surface", &["--set", "view.on=skin", "--colour", "von-mises"]);
         assert_ne!(surface, plain);
-        // A surface has no inside: a section shows that of the body that carries it.
+        // A surface has no inside: a section shows the inside of the body that carries it.
         let cut = ["--clip", "0.05,0.05,0.05,1,0.2,0"];
         let section = |on: &str| take(on, &[&["--set", &format!("view.on={on}")][..], &cut].concat());
         assert_eq!(section("skin"), section("block"));
@@ -218,8 +218,8 @@ mod with_pictures {
         assert!(output.err.contains("the last picture of each scene"), "{}", output.err);
     }
 
-    /// A bar that is held at one end, moved at the other one, and pressed from above: in its files, and in
-    /// pictures of the scene, of a surface that it carries, of the run and of its files.
+    /// A bar is held at one end, moved at the other one, and pressed from above. Its files show this, and so
+    /// do pictures of the scene, of a surface that it carries, of the run and of its files.
     #[test]
     fn constraints_and_loads_are_written_and_marked() {
         if !has_gpu() {

@@ -199,7 +199,7 @@ fn a_killed_run_leaves_a_series_that_can_be_read() {
     assert!(!workshop.path("out/case/summary.md").exists());
     let (_, rows) = workshop.table("out/case/history.csv");
     assert!(!rows.is_empty());
-    // The next run in the same folder leaves nothing of it.
+    // The next run in the same folder leaves none of these files.
     workshop.run(&["--force", "--until", "0.004"]).done();
     assert_eq!(workshop.series("out/case/fields.pvd").len(), 2);
     assert_eq!(fs::read_dir(workshop.path("out/case/fields")).unwrap().count(), 2);

@@ -69,7 +69,7 @@ fn fold(x: &Vector3) -> f64 {
     slab(x, [0.0; 3], [0.015, 0.008, 0.00375]).min(-slab(x, [0.005, 0.0, 0.0], [0.015, 0.02, 0.00075]))
 }
 
-/// What two balls have in common: a lens whose faces meet at 52°.
+/// Intersection of two balls: a lens whose faces meet at 52°.
 fn lens(x: &Vector3) -> f64 {
     ball(x, [0.0, 0.0, 0.027], 0.03).min(ball(x, [0.0, 0.0, -0.027], 0.03))
 }
@@ -138,8 +138,8 @@ fn shells_with_a_flap_or_a_thin_gap_run_under_pressure() {
     }
 }
 
-/// At a rim as sharp as that no normal stands on both sides: its nodes are creases, which the report and the
-/// run tell.
+/// At a rim of 52° no normal stands on both sides. The nodes of the rim are creases, which the report and the
+/// run count.
 #[test]
 fn the_nodes_of_a_sharp_rim_are_creases() {
     let (report, mesh, run) = pressed(Body(lens), ["--error", "1%"]);

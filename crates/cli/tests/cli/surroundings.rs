@@ -1,5 +1,5 @@
 //! The environment of a run, through the real binary: signals, locked folders, links in them, standard
-//! streams that can't be written, stale files, paths that are not files.
+//! streams that can't be written, stale files. Also paths that are not files.
 
 use std::fs::{self, File};
 use std::os::unix::fs::symlink;
@@ -37,7 +37,7 @@ fn sigterm_and_sighup_end_a_run_as_ctrl_c_does() {
         let scene = changed(BLOCK, "until = 0.02", "until = 5000");
         let workshop =
             Workshop::new(&changed(&scene, "threads = 1", "threads = 1\ncheckpoint = { every = 1 }"));
-        // What ignores SIGHUP, as `nohup`, hands that on to the tests.
+        // A parent that ignores SIGHUP, such as `nohup`, passes that on to the tests.
         let mut command = match cfg!(target_os = "linux") {
             true => {
                 let mut command = Command::new("env");
@@ -103,7 +103,7 @@ fn a_run_is_not_resumed_while_it_runs() {
         assert!(patience.elapsed() < Duration::from_secs(60), "no checkpoint came");
         std::thread::sleep(Duration::from_millis(2));
     }
-    // A checkpoint of the run may go while it is read: then another one is there.
+    // The run may replace a checkpoint while it is read: then another one can be read.
     let mut output = workshop.run(&["--resume", "out/case"]);
     for _ in 0..20 {
         if output.err.contains("cannot be read") {

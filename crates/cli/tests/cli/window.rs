@@ -71,12 +71,12 @@ struct Input {
     connection: RustConnection,
     root: u32,
     window: u32,
-    /// What the extension's requests begin with.
+    /// First byte of the extension's requests.
     opcode: u8,
 }
 
 impl Input {
-    /// Those of a screen whose one window is shown by now.
+    /// Opens the input of a screen whose one window is shown by now.
     fn new(screen: &Screen) -> Self {
         let (connection, number) = x11rb::connect(Some(&screen.display)).unwrap();
         let root = connection.setup().roots[number].root;
@@ -154,9 +154,10 @@ fn until(what: &str, window: &mut Child, mut happens: impl FnMut() -> bool) {
     }
 }
 
-/// With a real mouse and real keys: a button copies the view to the clipboard of the screen, V takes a film,
-/// and the hand pulls until the window closes. What holds the body holds against the hand, and a replay comes
-/// to the same bits. All else is tested without a screen (`crates/viewer/src/window/rehearsal`).
+/// With a real mouse and real keys a button copies the view to the clipboard of the screen. V takes a film,
+/// and the hand pulls until the window closes. The body's constraints hold against the hand, and a replay
+/// comes to the same bits. The other functions are tested without a screen
+/// (`crates/viewer/src/window/rehearsal`).
 #[test]
 fn mouse_and_keys_of_a_screen_lead_the_window() {
     if !has_gpu() {
@@ -224,8 +225,8 @@ fn mouse_and_keys_of_a_screen_lead_the_window() {
     }
 }
 
-/// A recording that cannot be written is refused before the window opens; one is whole after a signal, and
-/// has all but the last second where the window is killed.
+/// A recording that cannot be written is refused before the window opens. After a signal the recording is
+/// whole; if the window is killed, only the last second is missing.
 #[test]
 fn recordings_outlive_signals() {
     let workshop = Workshop::new(BALL);

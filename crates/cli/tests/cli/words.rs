@@ -196,7 +196,7 @@ fn a_small_organ_in_millimetres_is_noted() {
     assert!(output.out.contains("may be millimetres or centimetres"), "{}", output.out);
 }
 
-/// What other programs read is named, with what helps; a scene in XML is one mistake, not five of TOML.
+/// Files of other programs are named, with a remedy; a scene in XML is one mistake, not five of TOML.
 #[test]
 fn files_of_other_programs_are_named() {
     let workshop = workshop();

@@ -1,20 +1,21 @@
-//! The broad phase: pairs that may come near while nodes stay within wide skins: found by trees of boxes, and
-//! kept over lists and steps. Lists are chosen from them by distances alone, in the order of their numbers,
-//! so that what is in a list does not depend on when these pairs were found.
+//! The broad phase: finds pairs that may come near while nodes stay within wide skins. Trees of boxes find
+//! these pairs, which are kept over several lists and steps. A list takes its pairs by distance alone, in the
+//! order of their numbers. Its content does not depend on when the pairs were found.
 
 use nalgebra::Vector3;
 
 use super::ccd::Kind;
 use super::collision_mesh::{CollisionMesh, around};
 
-/// The wide skin of a node over that of a list.
+/// Wide skin of a node, over the skin of a list.
 const WIDER: f64 = 2.5;
-/// By how much it is wider at most, and its least, over the distance of the barrier.
+/// Largest difference between the wide skin and the skin of a list, and least wide skin, over the distance of
+/// the barrier.
 const MORE: f64 = 10.0;
 const LEAST: f64 = 4.0;
-/// The part of the wide skin of before that it is at least.
+/// Least wide skin, over the previous wide skin.
 const KEPT: f64 = 0.5;
-/// The most that round-off takes of a distance, over it; and a number of single precision.
+/// Largest round-off of a distance, over the distance; in double and in single precision.
 pub(super) const ROUND_OFF: f64 = 1e-9;
 const SINGLE: f64 = 2e-7;
 /// Pairs that are compared at once.
@@ -111,7 +112,7 @@ impl Pairs {
         }
     }
 
-    /// All pairs.
+    /// Returns all pairs.
     fn all(&self) -> impl Iterator<Item = [u32; 2]> {
         let starts = std::iter::once(&0).chain(&self.ends);
         let ranges = starts.zip(&self.ends).map(|(&from, &end)| from as usize..end as usize);
@@ -126,15 +127,15 @@ impl Pairs {
 pub(super) struct BroadPhase {
     /// Points of the first side, of the second, and edges.
     pairs: [Pairs; 3],
-    /// Of all nodes: skins [m], and places [m] when pairs were found; none before that.
+    /// Skins [m] of all nodes, and their places [m] when pairs were found; no places before the first search.
     skin: Vec<f64>,
     place: Vec<Vector3<f64>>,
-    /// The distance [m] within which they were found, beside skins.
+    /// The distance [m], besides skins, within which pairs were found.
     within: f64,
-    /// Of each face or edge the number, from 1 on, of the point or edge for which it was last left out.
+    /// Number, from 1 on, of the point or edge for which each face or edge was last left out.
     left_out: Vec<u32>,
-    /// How far [m] nodes have gone since, with the skins of a list; the same of primitives, and the skins of
-    /// these.
+    /// Distance [m] that each node has gone since, with the skin of a list; its largest value on each
+    /// primitive; and the largest skins on each primitive.
     reach: Vec<f64>,
     reaches: Lengths,
     skins: Lengths,
@@ -164,7 +165,7 @@ impl Lengths {
         }
     }
 
-    /// Those of the first and of the second primitives of a sort, of one or two sides.
+    /// Returns the lengths of the first and of the second primitives of a sort, of one or two sides.
     fn of(&self, sort: Sort, sides: usize) -> [&[f64]; 2] {
         match sort {
             Sort::Point(side) => [&self.points[side], &self.faces[if sides == 1 { 0 } else { 1 - side }]],
@@ -178,7 +179,8 @@ pub(super) fn other(sides: &[CollisionMesh], side: usize) -> &CollisionMesh {
     if sides.len() == 1 { &sides[0] } else { &sides[1 - side] }
 }
 
-/// How far [m] the whole surface goes that touches itself: what its parts have in common.
+/// Returns the mean motion [m] of a surface that touches itself: all its parts have this motion in common.
+/// Zero with two sides.
 pub(super) fn common(sides: &[CollisionMesh], motion: impl Fn(u32) -> Vector3<f64>) -> Vector3<f64> {
     let points = &sides[0].points;
     if sides.len() > 1 || points.is_empty() {
@@ -188,7 +190,7 @@ pub(super) fn common(sides: &[CollisionMesh], motion: impl Fn(u32) -> Vector3<f6
 }
 
 impl BroadPhase {
-    /// For so many nodes; nothing is found yet.
+    /// Makes a broad phase for a number of nodes; no pairs are found yet.
     pub fn new(sides: &[CollisionMesh], nodes: usize) -> Self {
         let most = sides.iter().map(|side| side.faces.len().max(side.edges.len())).max().unwrap_or(0);
         Self {
@@ -225,9 +227,10 @@ impl BroadPhase {
         found
     }
 
-    /// Calls back with the pairs that may be within a distance [m] and the skins [m] of their nodes at places
-    /// [m], sort by sort in the order of their numbers, with these lengths together, and with more. Finds
-    /// pairs anew if nodes have gone too far, with wide skins by the distance of the barrier [m].
+    /// Calls back with the pairs that may be within a distance [m] plus the skins [m] of their nodes at
+    /// places [m]. Pairs come sort by sort in the order of their numbers, each with this total length; some
+    /// are farther apart. Finds pairs anew if nodes have gone too far, with wide skins from the distance of
+    /// the barrier [m].
     pub fn each(
         &mut self,
         sides: &mut [CollisionMesh],
@@ -339,7 +342,7 @@ impl BroadPhase {
         }
     }
 
-    /// Finds the pairs of edges, leaving neighbours out like those of points.
+    /// Finds the pairs of edges, without neighbours, which are left out as for points.
     fn find_edges(&mut self, sides: &[CollisionMesh], apart: &Apart) {
         let Self { pairs, place, within, left_out, skins, .. } = self;
         let (side, against) = (&sides[0], other(sides, 0));

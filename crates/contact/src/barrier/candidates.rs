@@ -9,23 +9,23 @@ use super::collisions::{Mollified, NormalCollision, Stencil};
 use super::distance::Mollifier;
 use super::law::{Barrier, Slip};
 
-/// The reach of parts of one surface that are nearer at rest than that of the contact, over their distance at
-/// rest.
+/// Reach of parts of one surface that are nearer at rest than the reach of the contact, over their distance
+/// at rest.
 const NEAR: f64 = 0.98;
 /// Rest distances, over the distance of the barrier, up to which parts of one surface are in one place, and
 /// never touch each other.
 const IN_ONE_PLACE: f64 = 1e-3;
-/// The skin of a node beside the motion that it is to make, over that motion; and of a node of a rigid thing,
-/// which may turn: an arc of up to half a turn about the origin of the thing is no further from its chord
-/// than half of that. Lists are made anew where another arc leaves its skin.
+/// Skin of a node around its planned motion, over that motion; the second value is for nodes of rigid things,
+/// which may turn. An arc of up to half a turn about the origin of the thing is at most half of its chord
+/// away from the chord. Lists are made anew where another arc leaves its skin.
 const SKIN: [f64; 2] = [0.25, 0.55];
 /// Width of the bins that pairs are sorted into by their distance, over the distance of the barrier.
 const BIN: f64 = 0.2;
 /// The most bins: those beyond are in the last one.
 const BINS: usize = 1 << 12;
-/// The least skin and the longest motion, over the distance of the barrier. The longest is a mean edge if
-/// that is more, and that of a surface which touches itself always: all its parts are near others, and their
-/// lists would grow with the square of a motion over an edge.
+/// Least skin and longest motion, over the distance of the barrier. The longest motion is a mean edge if that
+/// is more. It is always a mean edge for a surface that touches itself. All parts of such a surface are near
+/// others, and their lists would grow with the square of a motion over an edge.
 const SKINS: [f64; 2] = [0.5, 20.0];
 
 /// A pair that may come near.
@@ -46,12 +46,12 @@ struct Candidate {
     most: f64,
 }
 
-/// How a contact acts.
+/// Parameters of a contact.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ContactParameters {
     /// The distance [m] that surfaces keep, with the radius of a rigid thing that is a point or an edge.
     pub kept: f64,
-    /// How far [m] the surface of a rigid thing is outside of that of its shape now.
+    /// Distance [m] that the surface of a rigid thing has grown outside the surface of its shape.
     pub growth: f64,
     pub law: Barrier,
     /// κ [Pa].
@@ -75,13 +75,13 @@ impl ContactParameters {
         self.offset() + self.law.distance
     }
 
-    /// The same for distances from the wall as it is now, its growth taken off already.
+    /// Returns the parameters for distances from the present wall, whose growth is already subtracted.
     pub fn of_wall(&self) -> Self {
         Self { growth: 0.0, ..*self }
     }
 
-    /// The same for a pair whose reach is no more than a length [m]: it keeps less, and if that is not enough
-    /// its barrier begins nearer.
+    /// Returns the parameters for a pair whose reach is at most a length [m]. The pair keeps a smaller
+    /// distance, and if that is not enough, its barrier begins at a smaller gap.
     fn within(&self, most: f64) -> Self {
         if most >= self.reach() {
             return *self;
@@ -90,7 +90,7 @@ impl ContactParameters {
         Self { kept, law: Barrier { distance: most - self.growth - kept }, ..*self }
     }
 
-    /// What a distance below the reach makes of a pair; `None` if it is none.
+    /// Returns the collision of a pair at a distance; `None` if the distance is beyond the reach.
     pub fn collision(
         &self,
         stencil: Stencil,
@@ -123,33 +123,33 @@ pub(super) struct Group {
     pub sides: Vec<CollisionMesh>,
     /// The rigid thing whose distance nodes of the first keep, by its number.
     pub wall: Option<u32>,
-    /// The rigid thing of the second, if there is one, by its number; and by how much [m] its surface rises
-    /// in the motion that is set.
+    /// Number of the rigid thing of the second side, if there is one; and the distance [m] by which its
+    /// surface rises in the motion that is set.
     pub thing: Option<u32>,
     pub rise: f64,
     pub parameters: ContactParameters,
-    /// Of one surface: places of its nodes at rest [m]; nodes with triangles, and edges, that are in one
-    /// place there.
+    /// Rest places [m] of the nodes of a surface that touches itself; its nodes and triangles, and its pairs
+    /// of edges, that coincide at rest.
     rest: Vec<Vector3<f64>>,
     apart: [Apart; 2],
-    /// In bins by their distance, in the order of their numbers within one.
+    /// Candidates in bins by their distance; within a bin in the order of their numbers.
     candidates: Vec<Candidate>,
-    /// Where the candidates of each bin begin; memory to sort them in.
+    /// Begin of the candidates of each bin, and memory to sort them in.
     bins: Vec<u32>,
     unsorted: Vec<Candidate>,
     /// Pairs that candidates are chosen from.
     broad_phase: BroadPhase,
-    /// The course [m] for which pairs were listed: a motion of all nodes, less what they have in common; and
-    /// how much of it they have gone.
+    /// The course [m] for which pairs were listed: a motion of all nodes without their common part. `gone` is
+    /// the part of the course that they have gone.
     course: Vec<Vector3<f64>>,
     gone: f64,
-    /// Of all nodes: skins [m] around the course, and with it; how far [m] they are off the course, and how
-    /// far [m] they go in a motion.
+    /// Lengths [m] of all nodes: the skin around the course, the skin with the course, the distance off the
+    /// course, and the length of a motion.
     skin: Vec<f64>,
     whole: Vec<f64>,
     moved: Vec<f64>,
     way: Vec<f64>,
-    /// How far [m] two primitives have come nearer at most since pairs were listed.
+    /// Bound [m] of the distance by which two primitives have come nearer since pairs were listed.
     nearer: f64,
     /// The largest bound [m] of how far primitives in the list go towards each other on the course.
     nearing: f64,
@@ -207,8 +207,8 @@ impl Group {
         self.apart.iter().map(Apart::len).sum()
     }
 
-    /// Lists what may come near while nodes go by a motion [m] from their places [m], or by so much of it as
-    /// no node goes too far in; this part.
+    /// Lists pairs that may come near while nodes move from their places [m] by a part of a motion [m]. The
+    /// part is 1 or less, so that no node goes too far. Returns the part.
     pub fn list(&mut self, place: &[Vector3<f64>], motion: &[Vector3<f64>]) -> f64 {
         let common = common(&self.sides, |node| motion[node as usize]);
         let Self { sides, course, skin, whole, .. } = self;
@@ -231,7 +231,7 @@ impl Group {
         part
     }
 
-    /// Lists what is within a distance [m] and the skins of both.
+    /// Lists pairs that are within a distance [m] plus the skins of both.
     fn find(&mut self, place: &[Vector3<f64>], within: f64) {
         let Self { sides, course, skin, whole, rest, apart, unsorted, broad_phase, parameters, .. } = self;
         unsorted.clear();
@@ -345,15 +345,15 @@ impl Group {
         holds
     }
 
-    /// Whether no node leaves its skin in a motion [m] from the places [m] last taken. On the way there it
-    /// does not either: the skin around the course is convex.
+    /// True if no node leaves its skin in a motion [m] from the places [m] last taken. Since the skin around
+    /// the course is convex, no node leaves it on the way either.
     pub fn has(&self, place: &[Vector3<f64>], listed: &[Vector3<f64>], motion: &[Vector3<f64>]) -> bool {
         let way = |node: u32| place[node as usize] + motion[node as usize] - listed[node as usize];
         self.off_course(way, |_, _| ()).1
     }
 
-    /// How much of the course nodes have gone that went some ways [m], and whether they are within skins
-    /// around it; calls back with how far [m] each is off.
+    /// Returns the part of the course that nodes have gone by their ways [m], and true if all are within
+    /// their skins around it. Calls back with the distance [m] of each node from the course.
     fn off_course(&self, way: impl Fn(u32) -> Vector3<f64>, mut off: impl FnMut(u32, f64)) -> (f64, bool) {
         let common = common(&self.sides, &way);
         let nodes = || self.sides.iter().flat_map(|side| &side.points);

@@ -1,8 +1,8 @@
-//! How far four points may go until two primitives come near: additive continuous collision detection (Li,
-//! Kaufman and Jiang 2021, algorithm 1). No point of a primitive goes further than its fastest corner, so
-//! that a part (d − ξ)/l of the motion is safe, with l the sum of the largest ways of both sides. The common
-//! motion is taken off first. Never later than the exact time in exact arithmetic; rounding of distances is
-//! far below the gap that is kept.
+//! Additive continuous collision detection: the part of a motion of four points until two primitives come
+//! near (Li, Kaufman and Jiang 2021, algorithm 1). No point of a primitive goes further than its fastest
+//! corner. So a part (d − ξ)/l of the motion is safe, with l the sum of the largest ways of both sides. The
+//! common motion is subtracted first. The result is never later than the exact time in exact arithmetic;
+//! rounding of distances is far below the gap that is kept.
 
 use nalgebra::Vector3;
 
@@ -34,8 +34,8 @@ impl Kind {
         }
     }
 
-    /// The way [m] between the middles of both, and the gap between their shadows on it times its length
-    /// [m²]: no distance is less than that gap. A tenth of the work of the distance.
+    /// Returns the way [m] between the middles of both, and the gap between their projections on it times its
+    /// length [m²]. No distance is less than that gap. Costs a tenth of the distance.
     #[inline]
     fn shadows(self, [a, b, c, d]: [&Vector3<f64>; 4]) -> (Vector3<f64>, f64) {
         match self {
@@ -58,14 +58,14 @@ impl Kind {
         if gap > 0.0 { gap / way.norm() } else { 0.0 }
     }
 
-    /// Whether that bound is above a length [m].
+    /// True if the bound of [`shadows`](Self::shadows) is above a length [m].
     #[inline]
     pub(super) fn is_beyond(self, points: [&Vector3<f64>; 4], length: f64) -> bool {
         let (way, gap) = self.shadows(points);
         gap > 0.0 && (length < 0.0 || gap * gap > length * length * way.norm_squared())
     }
 
-    /// How many of the four points are of the first primitive.
+    /// Number of points of the first primitive, out of four.
     pub fn split(self) -> usize {
         match self {
             Self::PointTriangle => 1,
@@ -91,21 +91,21 @@ impl Kind {
 /// Advances at most; where they end is safe, too.
 pub(super) const ADVANCES: usize = 10_000;
 
-/// What is asked of a motion.
+/// Parameters of the search for a safe part of a motion.
 #[derive(Clone, Copy, Debug)]
 pub struct Query {
     /// The distance ξ [m] below which the primitives are in each other.
     pub offset: f64,
-    /// By how much [m] that distance grows over the motion.
+    /// Growth [m] of the distance ξ over the motion.
     pub rise: f64,
     /// Part of the gap at the start that is to be kept.
     pub keep: f64,
-    /// How far the motion goes at most, 1 for all of it.
+    /// Largest part of the motion to test; 1 is the whole motion.
     pub most: f64,
 }
 
-/// The part of a motion, `most` or less, on the way to which at least half of `keep` of the gap at the start
-/// is left everywhere. Where it is less than `most`, no more than `keep` is left at its end. Zero where there
+/// Returns the part of a motion, at most `most`, along which at least half of `keep` of the first gap is left
+/// everywhere. Where the part is less than `most`, no more than `keep` is left at its end. Zero where there
 /// is no gap at the start.
 pub fn collision_free_fraction(
     kind: Kind,
@@ -152,8 +152,8 @@ mod tests {
         std::array::from_fn(|i| Vector3::from_fn(|c, _| all[i][c].as_f64().unwrap()))
     }
 
-    /// The 100 motions of the reference: no hit is missed, no time is later than the exact one, and where it
-    /// is below 0.8 of it, the gap there is a tenth of the first one at most.
+    /// The 100 motions of the reference: no hit is missed and no time is later than the exact one. Where a
+    /// time is below 0.8 of the exact one, the gap there is at most a tenth of the first gap.
     #[test]
     fn times_of_impact_are_never_late_and_seldom_early() {
         let text = include_str!("../../../../lab/validation/data/coupling/ipc_primitives.json");

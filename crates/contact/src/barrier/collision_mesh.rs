@@ -7,7 +7,7 @@ use super::features::Features;
 use crate::pairs::Surface;
 use crate::tree::{Bounds, Tree};
 
-/// Points, edges and triangles of one side of a contact. Nodes of rigid things are numbered after those of
+/// Points, edges and triangles of one side of a contact. Numbers of nodes of rigid things follow the nodes of
 /// the model.
 #[derive(Clone, Debug, Default)]
 pub(super) struct CollisionMesh {
@@ -17,13 +17,13 @@ pub(super) struct CollisionMesh {
     pub edges: Vec<[u32; 2]>,
     /// Triangles by their corners.
     pub faces: Vec<[u32; 3]>,
-    /// Areas at rest [m²]: of a node and of an edge a third of those of its triangles.
+    /// Areas at rest [m²]: a node and an edge have a third of the areas of their triangles.
     pub(super) point_areas: Vec<f64>,
     pub(super) edge_areas: Vec<f64>,
     pub(super) face_areas: Vec<f64>,
     /// Squares of the lengths of edges at rest [m²].
     pub(super) squares: Vec<f64>,
-    /// Whether they are of a rigid thing.
+    /// True if the side is a rigid thing.
     pub(super) is_rigid: bool,
     pub(super) face_tree: Tree,
     pub(super) edge_tree: Tree,
@@ -33,7 +33,7 @@ pub(super) struct CollisionMesh {
 }
 
 impl CollisionMesh {
-    /// That of a surface of a body, by the places at rest [m].
+    /// Makes the collision mesh of a surface of a body from the places at rest [m].
     pub(super) fn of_body(surface: &Surface, place: impl Fn(u32) -> Point) -> Self {
         let faces = surface.faces.clone();
         let mut edges: Vec<[u32; 2]> = faces
@@ -114,7 +114,7 @@ impl CollisionMesh {
     }
 }
 
-/// The box around nodes, each with a margin of its own [m].
+/// The box around nodes, each with its margin [m].
 pub(super) fn around<const N: usize>(
     nodes: [u32; N],
     place: &impl Fn(u32) -> Vector3<f64>,

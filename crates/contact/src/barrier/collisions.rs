@@ -1,5 +1,5 @@
-//! Collisions at the present state: normal ones of pairs within the reach of the barrier, and those of
-//! friction.
+//! Collisions at the present state: normal collisions of pairs within the reach of the barrier, and
+//! frictional collisions.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -11,17 +11,17 @@ const UNIT: f64 = 1e-12;
 /// Nodes of a collision and their coefficients: four, or one at a wall.
 #[derive(Clone, Copy, Debug)]
 pub struct Stencil {
-    /// The nodes; those of rigid things are numbered after those of the model.
+    /// The nodes; numbers of nodes of rigid things follow the nodes of the model.
     pub nodes: [u32; 4],
     /// Their coefficients c: Σ c x is the way from the second to the first.
     pub coefficients: [f64; 4],
-    /// How many there are.
+    /// Number of nodes.
     pub count: u8,
     /// The contact, by its number.
     pub contact: u32,
     /// The nodes from this one on are of the other primitive.
     pub split: u8,
-    /// Whether the first primitive is of the first side of the contact.
+    /// True if the first primitive is of the first side of the contact.
     pub in_order: bool,
 }
 
@@ -37,7 +37,7 @@ impl Stencil {
         self.parts().map(|(node, c)| of(node) * c).sum()
     }
 
-    /// Whether a node of it, by its place in it, is of the second side of the contact.
+    /// True if the node at an index of the stencil is of the second side of the contact.
     pub(crate) fn is_second(&self, at: usize) -> bool {
         (at < usize::from(self.split)) != self.in_order
     }
@@ -58,13 +58,13 @@ pub struct NormalCollision {
     pub energy: f64,
     /// The force [N] along the normal that keeps its sides apart.
     pub force: f64,
-    /// How it grows as they come nearer [N/m].
+    /// Growth of the force per approach [N/m].
     pub stiffness: f64,
-    /// Which parts of the primitives are nearest; none at a wall.
+    /// Nearest parts of the primitives; `None` at a wall.
     pub region: Option<Region>,
     /// Number of the smooth side, at a wall.
     pub side: u8,
-    /// What nearly parallel edges have beside.
+    /// Mollifier of nearly parallel edges.
     pub mollified: Option<Mollified>,
 }
 
@@ -86,7 +86,7 @@ impl NormalCollision {
     }
 }
 
-/// Of edges that are nearly parallel: their mollifier m, and what they would have without it.
+/// Mollifier m of edges that are nearly parallel, with their energy and force without it.
 #[derive(Clone, Copy, Debug)]
 pub struct Mollified {
     /// Its threshold [m⁴].
@@ -99,8 +99,8 @@ pub struct Mollified {
     pub force: f64,
 }
 
-/// A pair with friction: normal force, direction and coefficients are those of the last time that it was
-/// taken.
+/// A pair with friction. Its normal force, direction and coefficients are from the last call of
+/// [`lag`](super::BarrierStep::lag).
 #[derive(Clone, Copy, Debug)]
 pub struct FrictionCollision {
     /// Its nodes.

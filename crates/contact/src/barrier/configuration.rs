@@ -1,4 +1,4 @@
-//! Where all nodes and rigid things are at an instant of a step.
+//! Places of all nodes and rigid things at an instant of a step.
 
 use nalgebra::{Point3, Vector3};
 
@@ -26,8 +26,8 @@ impl Configuration {
         are_there
     }
 
-    /// Takes the places [m] of the nodes of the model. Those of rigid things, each a thing and a place [m] in
-    /// its frame, go along with them.
+    /// Takes the places [m] of the nodes of the model. Nodes of rigid things, each a thing and a place [m] in
+    /// its frame, follow their things.
     pub(crate) fn place_nodes(&mut self, position: &[Vector3<f64>], rigid_nodes: &[(u32, Vector3<f64>)]) {
         let (own, others) = self.place.split_at_mut(position.len());
         own.copy_from_slice(position);

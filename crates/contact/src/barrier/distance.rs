@@ -1,12 +1,12 @@
-//! Distances of a point and a triangle and of two edges, with the points that are nearest. With the
-//! coefficients c of the four points, Σ cᵢ xᵢ is the way from the second primitive to the first and n = Σ cᵢ
-//! xᵢ / d its direction; ∂d/∂xᵢ = cᵢ n, since the nearest points minimise the distance (envelope theorem).
-//! Edges that are nearly parallel have a smooth factor beside (`Mollifier`).
+//! Distances of a point and a triangle and of two edges, with the nearest points. With the coefficients c of
+//! the four points, Σ cᵢ xᵢ is the way from the second primitive to the first. Its direction is n = Σ cᵢ xᵢ /
+//! d. The gradient is ∂d/∂xᵢ = cᵢ n, since the nearest points minimise the distance (envelope theorem). Edges
+//! that are nearly parallel have a smooth factor as well (`Mollifier`).
 
 use nalgebra::Vector3;
 use pliant_geometry::barycentric_of_closest;
 
-/// What of the two primitives is nearest.
+/// Nearest parts of two primitives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Region {
     /// A point and the inside of a triangle.
@@ -29,7 +29,7 @@ pub struct Nearest {
     pub coefficients: [f64; 4],
     /// Σ c x / d; zero where the primitives meet.
     pub normal: Vector3<f64>,
-    /// Which parts of them are nearest.
+    /// Nearest parts of the primitives.
     pub region: Region,
 }
 
@@ -69,7 +69,8 @@ pub(crate) fn point_triangle(points: &[Vector3<f64>; 4]) -> Nearest {
     Nearest::new(points, coefficients, region)
 }
 
-/// The edge of the first two points and that of the other two. Of parallel ones an end is taken.
+/// Returns the nearest points of the edge of the first two points and the edge of the other two. On parallel
+/// edges an end is taken.
 pub(crate) fn edge_edge(points: &[Vector3<f64>; 4]) -> Nearest {
     let [a, b, c, d] = points;
     let (along, other, between) = (b - a, d - c, a - c);
@@ -114,7 +115,8 @@ pub(crate) fn edge_edge(points: &[Vector3<f64>; 4]) -> Nearest {
     Nearest::new(points, coefficients, region)
 }
 
-/// The distance [m] of two edges alone, in a third of the time of [`edge_edge`]; but for round-off the same.
+/// The distance [m] of two edges alone, equal to the distance of [`edge_edge`] up to round-off, in a third of
+/// the time.
 pub(super) fn edge_distance(points: &[Vector3<f64>; 4]) -> f64 {
     let [a, b, c, d] = points;
     let (along, other, between) = (b - a, d - c, a - c);
@@ -145,14 +147,14 @@ pub(super) fn edge_distance(points: &[Vector3<f64>; 4]) -> f64 {
 /// The square of the sine of the angle between edges above which their inner nearest points are exact.
 const SURE: f64 = 1e-6;
 
-/// The difference of those ends of two edges that are nearest to the points at parts s, t of them.
+/// Returns the difference of the ends of two edges that are nearest to the points at their parts s, t.
 fn nearest_difference([a, b, c, d]: &[Vector3<f64>; 4], [s, t]: [f64; 2]) -> Vector3<f64> {
     (if s < 0.5 { a } else { b }) - (if t < 0.5 { c } else { d })
 }
 
-/// The factor m(x) = (2 − x/e) x/e of two edges whose x = |e₁ × e₂|² is below e = 10⁻³ |E₁|² |E₂|², 1 above:
-/// it takes away the jump of the nearest points of parallel edges (Li et al. 2020, equation 24; E are the
-/// edges at rest).
+/// The factor m(x) = (2 − x/e) x/e of two edges whose x = |e₁ × e₂|² is below e = 10⁻³ |E₁|² |E₂|², and 1
+/// above. Here E are the edges at rest. The factor removes the jump of the nearest points of parallel edges
+/// (Li et al. 2020, equation 24).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Mollifier {
     /// m.
@@ -170,7 +172,7 @@ impl Mollifier {
         PARALLEL * first * second
     }
 
-    /// That of two edges by their ends [m] and the threshold e [m⁴].
+    /// Returns the mollifier of two edges by their ends [m] and the threshold e [m⁴].
     pub fn of([a, b, c, d]: &[Vector3<f64>; 4], threshold: f64) -> Self {
         let (along, other) = (b - a, d - c);
         let normal = along.cross(&other);
@@ -193,8 +195,8 @@ mod tests {
     use pliant_testing::Random;
     use serde_json::Value;
 
-    /// The distance alone is that of the nearest points, of edges in any position, parallel ones and points
-    /// among them: 1e-9 of it and of the round-off of coordinates.
+    /// The distance alone agrees with the distance of the nearest points to 1e-9 and the round-off of
+    /// coordinates. The edges have any position; parallel edges and points are among them.
     #[test]
     fn distances_of_edges_alone_are_those_of_their_nearest_points() {
         let mut random = Random::new(8);
@@ -226,7 +228,7 @@ mod tests {
         std::array::from_fn(|i| Vector3::from_fn(|c, _| all[3 * i + c].as_f64().unwrap()))
     }
 
-    /// What the differences of coordinates up to 2 leave of a distance: two units in the last place.
+    /// Rounding error of a distance from differences of coordinates up to 2: two units in the last place.
     const ROUNDING: f64 = 2.0 * f64::EPSILON;
 
     /// The largest difference of vectors, over the largest component of the second.
@@ -243,8 +245,8 @@ mod tests {
         nearest.coefficients.map(|c| nearest.normal * c)
     }
 
-    /// The 100 pairs of a point and a triangle, all regions: distances to 1e-12 or round-off of the
-    /// coordinates, gradients of distance and barrier to 1e-9.
+    /// The 100 pairs of a point and a triangle, in all regions: distances to 1e-12 or round-off of the
+    /// coordinates. Gradients of distance and barrier agree to 1e-9.
     #[test]
     fn point_triangle_pairs_are_those_of_the_reference() {
         let reference = reference();
@@ -274,8 +276,8 @@ mod tests {
         );
     }
 
-    /// The 100 pairs of edges: distances to 1e-12 (near-parallel ones to 1e-8), gradients and those of
-    /// mollified barriers to 1e-9.
+    /// The 100 pairs of edges: distances to 1e-12 (near-parallel ones to 1e-8), gradients, also of mollified
+    /// barriers, to 1e-9.
     #[test]
     fn edge_edge_pairs_are_those_of_the_reference() {
         let reference = reference();
@@ -377,7 +379,7 @@ mod tests {
         gradients_by_differences(1_000_000);
     }
 
-    /// Nothing in the primitives is nearer: by a search over their points.
+    /// A search over the points of the primitives finds nothing nearer.
     #[test]
     fn distances_are_the_least_over_all_points() {
         let mut random = Random::new(8);

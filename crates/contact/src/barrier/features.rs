@@ -13,16 +13,16 @@ pub(super) struct Features {
     pub points: Vec<Vector3<f64>>,
     /// Edges between them.
     pub edges: Vec<[u32; 2]>,
-    /// How far [m] the surface is from them: the radius of round shapes.
+    /// Distance [m] of the surface from the features: the radius of round shapes.
     pub offset: f64,
-    /// Whether they are the whole shape, so that distances of nodes are those of its features.
+    /// True if the features are the whole shape. Distances of nodes are then distances from the features.
     pub is_all: bool,
 }
 
 impl Features {
-    /// Those of a shape that bodies are outside of. A sphere is a point and a capsule an edge, with their
-    /// radius; others are their corners and edges, round ones those of the 32 flat sides they are drawn with.
-    /// Edges between sides in one plane count for nothing.
+    /// Returns the features of a shape that bodies are outside of. A sphere is a point and a capsule an edge,
+    /// with their radius. Other shapes are their corners and edges; a round one has the 32 flat sides that it
+    /// is drawn with. Edges between sides in one plane are left out.
     pub fn of(shape: &Shape) -> Self {
         match *shape {
             Shape::Sphere { radius } => {

@@ -1,4 +1,4 @@
-//! How far a motion may go until anything comes near: the filter of steps.
+//! The filter of steps: the part of a motion until anything comes near.
 
 use nalgebra::Vector3;
 
@@ -10,15 +10,16 @@ use super::system::Barriers;
 use crate::pose::Stance;
 use crate::touch::Passage;
 
-/// How often the motion of a rigid thing that turns is followed anew in a step.
+/// Largest number of restarts in a step while following a rigid thing that turns.
 const TURNS: usize = 40;
 /// Part of the way to a meeting that is gone where things turn.
 const SHORTER: f64 = 0.9;
 
 impl BarrierStep {
-    /// The part of a motion (six numbers a node), of so much of it at most, from places [m] at a fraction of
-    /// the step that leaves at least half of a part of every gap, while rigid things go the same part of the
-    /// way that is left to them. Pairs are listed anew if need be. What was evaluated stays as it is.
+    /// Returns the largest part, at most `most`, of a motion (six numbers a node) from places [m] at a
+    /// fraction of the step that is free of collisions. At least half of `keep` of every gap is left. Rigid
+    /// things go the same part of their remaining way. Lists pairs anew if need be. The evaluated state stays
+    /// unchanged.
     pub fn collision_free_fraction(
         &mut self,
         position: &[Vector3<f64>],
@@ -59,8 +60,8 @@ impl BarrierStep {
 }
 
 impl Barriers {
-    /// The part of the motion that is set, in which rigid things go to a fraction of the step between both
-    /// ends, that leaves at least half of a part of every gap.
+    /// Returns the part of the motion that is set which leaves at least half of `keep` of every gap. Rigid
+    /// things go to a fraction of the step between both ends.
     fn filtered(
         &mut self,
         now: &Configuration,
@@ -79,8 +80,8 @@ impl Barriers {
         most
     }
 
-    /// [`filtered`](Self::filtered) of nodes at a wall that goes to a target, with their distances [m] when
-    /// pairs were listed: no node comes nearer to it than both go.
+    /// Runs [`filtered`](Self::filtered) for nodes at a wall that goes to a target, with their distances [m]
+    /// when pairs were listed. A node comes nearer to the wall by at most the ways of both.
     fn filtered_at_wall(
         &self,
         (group, wall, distances): (&Group, u32, &[f64]),
@@ -124,7 +125,8 @@ impl Barriers {
     }
 }
 
-/// How far [m] a thing that turns goes at most where a node is, from one stance to another.
+/// Returns a bound of the way [m] that a turning thing goes at the place of a node, from one stance to
+/// another.
 fn swing([now, target]: [&Stance; 2], place: &Vector3<f64>) -> f64 {
     let [from, to] = [&now.pose, &target.pose].map(|pose| pose.translation.vector);
     let shift = (to - from).norm();

@@ -1,9 +1,9 @@
-//! Second derivatives of barriers. Nearest points at parameters y minimise the distance d = |Σ c(y) x|, so
-//! that ∂²d/∂x² = f_xx − f_xy f_yy⁻¹ f_yx. With directions y whose tangents t are orthonormal, g the slope of
-//! c and n the normal, this is Σ (c⊗s)(c⊗s)ᵀ/d over tangents s along which no nearest point goes, less
-//! (g⊗n)(c⊗t)ᵀ + (c⊗t)(g⊗n)ᵀ + d (g⊗n)(g⊗n)ᵀ of each direction. A barrier pushes, b' ≤ 0, so that its
-//! stiffness keeps the positive part of −∂²d/∂x²: with g of different directions orthogonal, that is a rank
-//! of one for each, in closed form.
+//! Second derivatives of barriers. Nearest points at parameters y minimise the distance d = |Σ c(y) x|. Hence
+//! ∂²d/∂x² = f_xx − f_xy f_yy⁻¹ f_yx. Let directions y have orthonormal tangents t, and let g be the slope of
+//! c and n the normal. Then this matrix is Σ (c⊗s)(c⊗s)ᵀ/d over tangents s along which no nearest point goes.
+//! Each direction subtracts (g⊗n)(c⊗t)ᵀ + (c⊗t)(g⊗n)ᵀ + d (g⊗n)(g⊗n)ᵀ. A barrier pushes, b' ≤ 0, so that its
+//! stiffness keeps the positive part of −∂²d/∂x². Slopes g of different directions are orthogonal. The
+//! positive part then has rank one for each, in closed form.
 
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector3};
 
@@ -112,8 +112,8 @@ fn second_derivative(points: &[Vector3<f64>; 4], near: &Nearest) -> Matrix12 {
     sum + block(c, &(free / near.distance))
 }
 
-/// The positive part [N/m] of the stiffness of edges that are nearly parallel, m B'' ∇d∇dᵀ + m B' ∂²d +
-/// ∇m∇Bᵀ + ∇B∇mᵀ + B ∂²m, with B'' [N/m] that of the pair.
+/// Returns the positive part [N/m] of the stiffness of edges that are nearly parallel: m B'' ∇d∇dᵀ + m B'
+/// ∂²d + ∇m∇Bᵀ + ∇B∇mᵀ + B ∂²m. Here B'' [N/m] is the curvature of the pair.
 pub(super) fn of_parallel(
     points: &[Vector3<f64>; 4],
     near: &Nearest,
@@ -232,8 +232,9 @@ mod tests {
         Some((sum + sum.transpose()) * 0.5)
     }
 
-    /// In each region, and of edges that are nearly parallel: the stiffness is that by differences of forces
-    /// with the curvature of the distance, or the whole of parallel edges, without its negative part (A10).
+    /// In each region the stiffness is the curvature along the distance and the positive part of the
+    /// remaining differences of forces. For edges that are nearly parallel it is the positive part of the
+    /// whole (A10).
     #[test]
     fn stiffness_is_the_positive_part_of_differences_of_forces() {
         let mut random = Random::new(12);

@@ -1,5 +1,5 @@
-//! Whether surfaces are in each other: edges against triangles, without the lists that contacts go by. The
-//! slow simple check that fast ones are held to.
+//! Intersections of surfaces: edges against triangles, without the lists of the contacts. A slow and simple
+//! check to test fast ones against.
 
 use nalgebra::Vector3;
 
@@ -92,8 +92,8 @@ impl IntersectionCheck {
     }
 }
 
-/// The shortest way that parts an edge and a triangle which it goes through, with its nodes: an end goes to
-/// the triangle, or the edge to a side.
+/// Returns the shortest way that separates an edge from a triangle which it crosses, with its nodes. Either
+/// an end goes to the triangle, or the edge to a side.
 fn way_out(
     [p, q]: [u32; 2],
     [a, b, c]: [u32; 3],
@@ -146,11 +146,11 @@ pub(super) fn intersections(
 /// Edges for which no tree of triangles is made.
 const FEW: usize = 4;
 
-/// Volumes over the cube of the largest extent that are none but for round-off: of points in a plane.
+/// Volume of points in a plane due to round-off, over the cube of the largest extent.
 const FLAT: f64 = 1e-14;
 
-/// Whether an edge goes through a triangle: its ends are on both sides of the plane, and the line goes round
-/// all three edges in one sense. In one plane nothing goes through anything.
+/// True if an edge goes through a triangle. Its ends are on both sides of the plane, and the line goes round
+/// all three edges in one sense. False if all points are in one plane.
 fn goes_through([p, q]: [Vector3<f64>; 2], [a, b, c]: [Vector3<f64>; 3]) -> bool {
     // Six times the volume of a tetrahedron.
     let volume = |x: &Vector3<f64>, y: &Vector3<f64>, z: &Vector3<f64>, of: &Vector3<f64>| {
@@ -195,7 +195,7 @@ mod tests {
         assert!(through([0.2, 0.2, 1.0], [0.3, 0.2, -1.0]) && through([0.2, 0.2, -1.0], [0.3, 0.2, 1.0]));
         assert!(!through([0.2, 0.2, 1.0], [0.3, 0.2, 0.1]) && !through([0.8, 0.8, 1.0], [0.8, 0.8, -1.0]));
         assert!(!through([-0.1, 0.5, 0.0], [1.0, 0.5, 0.0]));
-        // In a line with a side, beside it, in one plane but for round-off.
+        // In a line with a side, outside the triangle, in one plane but for round-off.
         let sheet = |x: f64, y: f64| Vector3::new(0.1 * x, 0.1 * y, 1e-17 * x);
         let corners = [sheet(4.0, 1.0), sheet(4.0, 2.0), sheet(3.0, 2.0)];
         assert!(!goes_through([sheet(2.0, 3.0), sheet(1.0, 4.0)], corners));

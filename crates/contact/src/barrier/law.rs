@@ -1,7 +1,7 @@
 //! The barrier and smooth friction, as functions of one number.
 
-/// The barrier b(g) = −ĝ (y − 1)² ln y with y = g/ĝ for gaps g below ĝ, zero above (Li et al. 2020, equation
-/// 6, in the physical form of Li et al. 2023: with κ [Pa] in front, κ |b'| is a pressure).
+/// The barrier b(g) = −ĝ (y − 1)² ln y with y = g/ĝ for gaps g below ĝ, and zero above (Li et al. 2020,
+/// equation 6). This is the physical form of Li et al. 2023: with κ [Pa] in front, κ |b'| is a pressure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Barrier {
     /// The gap ĝ [m] below which it acts.
@@ -9,7 +9,7 @@ pub struct Barrier {
 }
 
 impl Barrier {
-    /// b [m] at a gap [m]; infinite where there is none.
+    /// Returns b [m] at a gap [m]; infinite for a gap of zero or less.
     pub fn energy(&self, gap: f64) -> f64 {
         let y = gap / self.distance;
         match y {
@@ -35,9 +35,9 @@ impl Barrier {
     }
 }
 
-/// Coulomb's friction made smooth at a slip u below ε (Li et al. 2020, equation 18): D = μ λ f₀(u), of which
-/// the force is μ λ f₁(u), f₁ = f₀'. The sum of slip over a step is meant, and ε = ε_v h with a speed ε_v
-/// below which a body creeps that should stick.
+/// Coulomb's friction made smooth at a slip u below ε (Li et al. 2020, equation 18). Its potential is D = μ λ
+/// f₀(u), and its force μ λ f₁(u) with f₁ = f₀'. The slip is the sum over a step. The limit is ε = ε_v h,
+/// with ε_v the speed below which a sticking body creeps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slip {
     /// ε [m].

@@ -1,8 +1,8 @@
-//! Contact by a barrier: surfaces that never go into each other, whatever an iteration of a solver does. The
-//! energy κ A b(d − ξ) of a pair of primitives at a distance d grows without bound as the gap d − ξ vanishes
-//! ([law]); [distances](distance) are those of points and triangles and of edges, and a [filter](ccd) of
-//! motions stops before any pair meets. [`Barriers`] lists pairs that come near; a [`BarrierStep`] of them
-//! evaluates their energy, forces and stiffness, and filters motions.
+//! Contact by a barrier: surfaces never intersect, whatever an iteration of a solver does. The energy κ A
+//! b(d − ξ) of a pair of primitives at a distance d grows without bound as the gap d − ξ vanishes ([law]).
+//! There are [distances](distance) of points and triangles and of edges. A [filter](ccd) of motions stops
+//! before any pair meets. [`Barriers`] lists pairs that come near. A [`BarrierStep`] evaluates their energy,
+//! forces and stiffness, and filters motions.
 //!
 //! Sources: Li et al. 2020 (TOG 39:49), incremental potential contact; Li, Kaufman and Jiang 2021 (arXiv
 //! 2012.04457), thickness and additive continuous collision detection; Li et al. 2023 (arXiv 2307.15908),

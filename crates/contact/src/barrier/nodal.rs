@@ -1,5 +1,4 @@
-//! What barriers do to single nodes: how hard they push them along their normals, the least gaps, and how far
-//! nodes slide.
+//! Effect of barriers on single nodes: their forces along the normals, the least gaps, and their slip.
 
 use std::collections::BTreeMap;
 
@@ -17,15 +16,16 @@ pub struct NodeTouch {
     pub gap: f64,
     /// Sum of the forces [N] of barriers on it, without friction.
     pub push: [f64; 3],
-    /// How far it has slid [m] since it came within the reach.
+    /// Slip [m] of the node since it came within the reach.
     pub slip: f64,
 }
 
 impl BarrierStep {
-    /// All nodes within the reach of a barrier at the state last evaluated, by increasing node. `before` has
-    /// them at the start of the step: their slip goes on by the length of the way that they went in it along
-    /// what they touch, the mean of all that bears on a node, weighted by its forces. `share` calls back with
-    /// the nodes that a node of the contacts stands for and their parts in it: itself, or those around it.
+    /// Returns all nodes within the reach of a barrier at the state last evaluated, by increasing node.
+    /// `before` holds the nodes at the start of the step. Their slip grows by the length of their way in the
+    /// step along the surface that they touch. That way is the mean over all collisions of a node, weighted
+    /// by force. `share` calls back with the nodes that a contact node stands for, and their shares: itself,
+    /// or nodes around it.
     pub fn touches(
         &self,
         before: &[NodeTouch],

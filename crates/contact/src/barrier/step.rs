@@ -1,13 +1,13 @@
 //! A step in contact: collisions at a state, their energy and forces, and friction over the step.
 //!
-//! A step goes from one time to another. The part of the way that rigid things have gone in it is its *time
-//! fraction*, from 0 to 1: on straight ways and shortest arcs between their poses, and their growth in
-//! proportion. Friction of a step is that of the state where [`BarrierStep::lag`] was called last, with
-//! directions and normal forces as they were there.
+//! A step goes from one time to another. Its *time fraction*, from 0 to 1, is the part of their ways that
+//! rigid things have gone in the step. These ways are straight, with the shortest arcs between poses and
+//! growth in proportion. Friction of a step uses the directions and normal forces of the state where
+//! [`BarrierStep::lag`] was called last.
 //!
-//! Types fix the order of calls. Only [`Barriers::begin`] makes a step, and it evaluates the start. So
-//! there are always collisions to read, and they are those of the state last evaluated, since a search for a
-//! [fraction](BarrierStep::collision_free_fraction) leaves them alone.
+//! Types fix the order of calls. Only [`Barriers::begin`] makes a step, and it evaluates the start.
+//! Collisions are therefore always available, and belong to the state last evaluated: a search for a
+//! [fraction](BarrierStep::collision_free_fraction) leaves them unchanged.
 
 use std::collections::BTreeMap;
 
@@ -17,7 +17,7 @@ use super::collisions::{FrictionCollision, NormalCollision, Stencil};
 use super::configuration::Configuration;
 use super::intersections::intersections;
 use super::law::Slip;
-use super::system::Barriers;
+use super::system::{Barriers, Meeting};
 use crate::pose::{Leg, Stance};
 use crate::touch::Contacts;
 
@@ -32,15 +32,48 @@ pub struct BarrierStep {
     /// The state last evaluated, and how far rigid things have gone there.
     pub(super) now: Configuration,
     pub(super) time_fraction: f64,
-    /// Where the search for a fraction starts.
+    /// State from which the search for a fraction starts.
     pub(super) tried: Configuration,
     pub(super) normal_collisions: Vec<NormalCollision>,
     pub(super) friction_collisions: Vec<FrictionCollision>,
-    /// Of barriers and of friction [J].
+    /// Energies of barriers and of friction [J].
     energy: [f64; 2],
-    /// Whether another evaluation of the same state is spared. No longer after a search elsewhere: the order
-    /// of sums is that of lists.
+    /// True if the same state need not be evaluated again. False after a search elsewhere, since lists set
+    /// the order of sums.
     pub(super) is_current: bool,
+}
+
+impl Barriers {
+    /// Begins the first step, as [`BarrierStep::begin_next`] does the others.
+    pub fn begin(self, position: &[Vector3<f64>], motion: &[f64], times: [f64; 2]) -> BarrierStep {
+        BarrierStep::first(self, position, motion, times)
+    }
+
+    /// Whatever has no gap at places [m] and a time [s]: pairs within the distance to keep, nodes in walls,
+    /// and edges through triangles. With no regard to what came before.
+    pub fn meetings(self, position: &[Vector3<f64>], time: f64) -> Vec<Meeting> {
+        let none = vec![0.0; 6 * self.nodes];
+        let step = self.begin(position, &none, [time; 2]);
+        let Self { groups, nodes, wall_distances, .. } = &step.barriers;
+        let mut all = Vec::new();
+        let of = |contact: u32, at: &[u32], gap: Option<f64>| {
+            let node = at.iter().copied().find(|node| (*node as usize) < *nodes)?;
+            Some(Meeting { contact, node, place: position[node as usize].into(), gap })
+        };
+        for (group, distances) in groups.iter().zip(wall_distances) {
+            group.too_close(&step.now.place, |at, gap| all.extend(of(group.number, &at, Some(gap))));
+            if group.wall.is_some() {
+                let distances = group.sides[0].points.iter().zip(distances);
+                let gaps = distances.map(|(&node, distance)| (node, distance - group.parameters.kept));
+                all.extend(
+                    gaps.filter(|(_, gap)| *gap <= 0.0)
+                        .filter_map(|(node, gap)| of(group.number, &[node], Some(gap))),
+                );
+            }
+        }
+        step.intersections(|contact, ends, corners| all.extend(of(contact, &[ends[0], corners[0]], None)));
+        all
+    }
 }
 
 impl BarrierStep {
@@ -182,8 +215,8 @@ impl BarrierStep {
         self.energy[1] = energy;
     }
 
-    /// The way [m] of the first primitive of a stencil from the second in the step: Σ c x less Σ c x at the
-    /// start. A wall carries its start along.
+    /// Returns the change [m] over the step of the way between both primitives of a stencil: Σ c x less Σ c x
+    /// at the start. A wall carries the start along.
     pub(super) fn way(&self, stencil: &Stencil) -> Vector3<f64> {
         let start = stencil.combine(|node| self.start[node as usize]);
         let wall = self.barriers.groups[stencil.contact as usize].wall_of(stencil);
@@ -191,8 +224,8 @@ impl BarrierStep {
         stencil.combine(|node| self.now.place[node as usize]) - start
     }
 
-    /// The energy [J] with nodes at places [m] and rigid things at a fraction of the step, that of friction
-    /// with it; infinite if there is no gap somewhere.
+    /// Returns the energy [J], with friction, for nodes at places [m] and rigid things at a fraction of the
+    /// step. Infinite if a gap is zero or less.
     pub fn evaluate(&mut self, position: &[Vector3<f64>], time_fraction: f64) -> f64 {
         self.put(position, time_fraction);
         self.find_collisions();
@@ -205,12 +238,12 @@ impl BarrierStep {
         self.energy[0]
     }
 
-    /// What acts at the state last evaluated.
+    /// Returns the normal collisions at the state last evaluated.
     pub fn normal_collisions(&self) -> &[NormalCollision] {
         &self.normal_collisions
     }
 
-    /// What friction holds.
+    /// Returns the frictional collisions.
     pub fn friction_collisions(&self) -> &[FrictionCollision] {
         &self.friction_collisions
     }
@@ -278,8 +311,8 @@ impl BarrierStep {
             .for_each(|stencil| found(&self.barriers.own(&stencil.nodes)));
     }
 
-    /// Calls back with the nodes of the model of each pair that may act soon: within so many distances of its
-    /// barrier more than the reach.
+    /// Calls back with the nodes of the model of each pair that may act soon. Such a pair is within the reach
+    /// plus `distances` times the distance of its barrier.
     pub fn near(&mut self, distances: f64, mut found: impl FnMut(&[u32])) {
         let Self { barriers, now, .. } = self;
         // A search for a fraction may have left lists elsewhere.
@@ -296,23 +329,24 @@ impl BarrierStep {
         self.barriers.nodes
     }
 
-    /// Who touches whom.
+    /// The contacts with their surfaces and rigid things.
     pub fn contacts(&self) -> &Contacts {
         &self.barriers.contacts
     }
 
-    /// Where rigid things go that are driven from outside, by their number; from the next step on.
+    /// Returns the ways of rigid things that are driven from outside, by their number; changes act from the
+    /// next step on.
     pub fn legs_mut(&mut self) -> &mut BTreeMap<u32, Leg> {
         &mut self.barriers.legs
     }
 
-    /// The same to look at.
+    /// Returns the same ways read-only.
     pub fn legs(&self) -> &BTreeMap<u32, Leg> {
         &self.barriers.legs
     }
 
-    /// Rigid things beside their trajectories, by their number, at the start and the end of a step [m]; from
-    /// the next step on.
+    /// Shifts [m] of rigid things off their trajectories, by their number, at the start and the end of a
+    /// step. Changes act from the next step on.
     pub fn shifts_mut(&mut self) -> &mut Vec<(u32, [Vector3<f64>; 2])> {
         &mut self.barriers.shifts
     }

@@ -11,10 +11,10 @@ use super::step::{BarrierStep, carried};
 const DIFFERENCE: f64 = 0.01;
 
 impl BarrierStep {
-    /// Calls back with the stiffness [N/m] of each collision, never negative: its stencil, three rows and
-    /// columns a node, and the ways [m] that the rigid things among its nodes have yet to go in the step; of
-    /// one node at a wall the way from the wall. That of barriers is κ A b″ ∇d ∇dᵀ and the positive part of κ
-    /// A b′ ∂²d/∂x²; that of friction is exact.
+    /// Calls back with the stiffness [N/m] of each collision, never negative: its stencil and three rows and
+    /// columns a node. The last argument has the ways [m] that the rigid things among its nodes have yet to
+    /// go in the step. For a node at a wall this is the way of the node relative to the wall. Barriers
+    /// contribute κ A b″ ∇d ∇dᵀ and the positive part of κ A b′ ∂²d/∂x². The stiffness of friction is exact.
     pub fn stiffness(&self, mut add: impl FnMut(&Stencil, &Matrix12, [Vector3<f64>; 4])) {
         let ([from, to], now) = (&self.ends, &self.now.stances);
         let goes_on = self.time_fraction < 1.0 && from != to;
@@ -29,8 +29,8 @@ impl BarrierStep {
                 ways[0] = place - carried(Some(wall), [now, to], &place) - outward * rises(wall);
                 return ways;
             }
-            // What is left of the rise counts as a way of all nodes of the thing, along the normal by which
-            // their distance falls.
+            // The rest of the rise counts as a way of all nodes of the thing, along the normal by which their
+            // distance falls.
             let own = |node: u32| self.barriers.rigid_node(node);
             let sum: f64 = stencil.parts().filter_map(|(node, c)| own(node).map(|_| c)).sum();
             for (way, (node, _)) in ways.iter_mut().zip(stencil.parts()) {
@@ -71,8 +71,8 @@ impl BarrierStep {
         }
     }
 
-    /// The positive part [1/m] of −∂²d/∂x² of a collision at a wall, by differences over a part of the
-    /// distance [m] of its barrier.
+    /// Returns the positive part [1/m] of −∂²d/∂x² of a collision at a wall. Uses differences over a part of
+    /// the distance [m] of its barrier.
     fn curved_wall(&self, wall: u32, collision: &NormalCollision, distance: f64) -> Matrix3<f64> {
         let (rigid, stance) =
             (&self.barriers.contacts.rigids[wall as usize], &self.now.stances[wall as usize]);

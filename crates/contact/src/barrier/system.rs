@@ -11,12 +11,11 @@ use super::collisions::{NormalCollision, Stencil};
 use super::configuration::Configuration;
 use super::features::Features;
 use super::law::{Barrier, Slip};
-use super::step::BarrierStep;
 use crate::pose::{Leg, Stance};
 use crate::shape::Near;
 use crate::touch::{Contacts, Passage, With};
 
-/// How a contact acts.
+/// Settings of a barrier contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BarrierSettings {
     /// The gap ĝ [m] below which surfaces push each other away, in addition to the distance that they keep.
@@ -34,14 +33,13 @@ pub struct Meeting {
     pub contact: u32,
     /// A node of the model that takes part.
     pub node: u32,
-    /// Where it is [m].
+    /// Place of the node [m].
     pub place: [f64; 3],
     /// The gap [m], not above 0; none where an edge goes through a triangle.
     pub gap: Option<f64>,
 }
 
-/// The contacts of a model. They act in the steps that [`begin`](Self::begin) makes of them, and in no other
-/// way.
+/// The contacts of a model. They act only in steps ([`BarrierStep`](super::BarrierStep)).
 #[derive(Clone, Debug)]
 pub struct Barriers {
     pub(super) contacts: Arc<Contacts>,
@@ -50,22 +48,22 @@ pub struct Barriers {
     pub(super) nodes: usize,
     /// Nodes of rigid things, after those: their thing and their place [m] in its frame.
     pub(super) rigid_nodes: Vec<(u32, Vector3<f64>)>,
-    /// Where all was when pairs were listed.
+    /// State of nodes and rigid things when pairs were listed.
     pub(super) listed: Configuration,
     /// Motions [m] of all nodes for which pairs are listed or filtered.
     pub(super) motion: Vec<Vector3<f64>>,
     /// Distances [m] of nodes from the wall of each contact when they were listed.
     pub(super) wall_distances: Vec<Vec<f64>>,
-    /// Where rigid things go that are driven from outside, by their number.
+    /// Ways of rigid things that are driven from outside, by their number.
     pub(super) legs: BTreeMap<u32, Leg>,
-    /// Rigid things beside their trajectories, by their number: how far [m] at the start and the end of the
+    /// Shifts [m] of rigid things off their trajectories, by their number, at the start and the end of the
     /// step.
     pub(super) shifts: Vec<(u32, [Vector3<f64>; 2])>,
 }
 
 impl Barriers {
-    /// For contacts, each with its settings, and nodes at rest [m]. The distance that surfaces keep is that
-    /// of their [`Touch`](crate::touch::Touch).
+    /// Makes the barriers of contacts, each with its settings, and nodes at rest [m]. Surfaces keep the
+    /// distance of their [`Touch`](crate::touch::Touch).
     pub fn new(contacts: Arc<Contacts>, settings: &[BarrierSettings], rest: &[[f64; 3]]) -> Self {
         let mut places: Vec<Vector3<f64>> = rest.iter().map(|&x| x.into()).collect();
         let nodes = places.len();
@@ -121,40 +119,9 @@ impl Barriers {
         }
     }
 
-    /// Of each contact the pairs that never touch, since they are in one place at rest.
+    /// Returns, for each contact, the number of pairs that never touch because they coincide at rest.
     pub fn apart_counts(&self) -> Vec<usize> {
         self.groups.iter().map(Group::apart_count).collect()
-    }
-
-    /// Begins the first step, as [`BarrierStep::begin_next`] does the others.
-    pub fn begin(self, position: &[Vector3<f64>], motion: &[f64], times: [f64; 2]) -> BarrierStep {
-        BarrierStep::first(self, position, motion, times)
-    }
-
-    /// Whatever has no gap at places [m] and a time [s]: pairs within the distance to keep, nodes in walls,
-    /// and edges through triangles. With no regard to what came before.
-    pub fn meetings(self, position: &[Vector3<f64>], time: f64) -> Vec<Meeting> {
-        let none = vec![0.0; 6 * self.nodes];
-        let step = self.begin(position, &none, [time; 2]);
-        let Self { groups, nodes, wall_distances, .. } = &step.barriers;
-        let mut all = Vec::new();
-        let of = |contact: u32, at: &[u32], gap: Option<f64>| {
-            let node = at.iter().copied().find(|node| (*node as usize) < *nodes)?;
-            Some(Meeting { contact, node, place: position[node as usize].into(), gap })
-        };
-        for (group, distances) in groups.iter().zip(wall_distances) {
-            group.too_close(&step.now.place, |at, gap| all.extend(of(group.number, &at, Some(gap))));
-            if group.wall.is_some() {
-                let distances = group.sides[0].points.iter().zip(distances);
-                let gaps = distances.map(|(&node, distance)| (node, distance - group.parameters.kept));
-                all.extend(
-                    gaps.filter(|(_, gap)| *gap <= 0.0)
-                        .filter_map(|(node, gap)| of(group.number, &[node], Some(gap))),
-                );
-            }
-        }
-        step.intersections(|contact, ends, corners| all.extend(of(contact, &[ends[0], corners[0]], None)));
-        all
     }
 
     /// Lets surfaces be as large as rigid things are now.
@@ -164,8 +131,8 @@ impl Barriers {
         }
     }
 
-    /// Sets the motions of all nodes: parts of one motion (six numbers a node), and rigid things from where
-    /// they are to a fraction of the step between both ends.
+    /// Sets the motions of all nodes. Nodes of the model go a part of one motion (six numbers a node). Rigid
+    /// things go from their present place to a fraction of the step between both ends.
     pub(super) fn set_motion(
         &mut self,
         now: &Configuration,
@@ -223,12 +190,12 @@ impl Barriers {
         }
     }
 
-    /// Whether no node leaves its skin in the motion that is set.
+    /// True if no node leaves its skin in the motion that is set.
     pub(super) fn lists_have_motion(&self, now: &Configuration) -> bool {
         self.groups.iter().all(|group| group.has(&now.place, &self.listed.place, &self.motion))
     }
 
-    /// How far [m] a rigid thing has gone since pairs were listed.
+    /// Returns the way [m] that a rigid thing has gone since pairs were listed.
     pub(super) fn travel(&self, wall: u32, now: &Configuration) -> f64 {
         let rigid = &self.contacts.rigids[wall as usize];
         let [then, now] = [&self.listed, now].map(|own| own.stances[wall as usize]);
@@ -248,8 +215,8 @@ impl Barriers {
         })
     }
 
-    /// Adds the collisions of nodes with the wall of a contact, whose distances [m] were these when pairs
-    /// were listed; false if one has no gap.
+    /// Adds the collisions of nodes with the wall of a contact, with their distances [m] when pairs were
+    /// listed. Returns false if one has no gap.
     fn find_collisions_at_wall(
         &self,
         group: &Group,
@@ -294,7 +261,7 @@ impl Barriers {
         (node as usize).checked_sub(self.nodes).map(|at| &self.rigid_nodes[at])
     }
 
-    /// Those nodes that are of the model.
+    /// Returns the nodes that belong to the model.
     pub(super) fn own(&self, nodes: &[u32]) -> Vec<u32> {
         nodes.iter().copied().filter(|&node| (node as usize) < self.nodes).collect()
     }

@@ -101,8 +101,8 @@ fn growing(by: f64) -> Vec<Rigid> {
     all.collect()
 }
 
-/// Forces are minus the gradient of the energy of barriers and friction together, and those of a contact
-/// between bodies add up to nothing with those on the other side.
+/// Forces are minus the gradient of the energy of barriers and friction together. Forces of a contact between
+/// bodies balance the forces on the other side.
 #[test]
 fn forces_are_gradients_and_balance() {
     let mut random = Random::new(2);
@@ -145,8 +145,8 @@ fn forces_are_gradients_and_balance() {
     }
 }
 
-/// The stiffness is positive semi-definite, and along a thing of any shape that bodies are in or out of, that
-/// of the wall by differences.
+/// The stiffness is positive semi-definite. Along a thing of any shape, outside or inside, it equals the
+/// stiffness of the wall by differences.
 #[test]
 fn stiffness_is_never_negative() {
     let mut hollow = rigid(Shape::Sphere { radius: 0.6 }, [0.0, 0.0, 0.407], [0.001, 0.0, 0.002]);
@@ -187,8 +187,8 @@ fn stiffness_is_never_negative() {
     }
 }
 
-/// Whatever motion is asked for, what is allowed of it ends with gaps everywhere and no edge in a triangle;
-/// it is all of a small motion.
+/// The allowed part of any motion ends with gaps everywhere and no edge in a triangle. A small motion is
+/// allowed wholly.
 #[test]
 fn no_motion_that_is_allowed_goes_through() {
     let mut random = Random::new(9);
@@ -224,9 +224,9 @@ fn no_motion_that_is_allowed_goes_through() {
     }
 }
 
-/// Neighbours of a sheet that is thicker than its triangles are high have a reach of their own: nothing acts
-/// at rest, and no motion that is allowed takes an edge through a triangle. Parts that are farther from each
-/// other keep all of the distance.
+/// A sheet that is thicker than its triangles are high has a smaller reach between neighbours. Nothing acts
+/// at rest, and no allowed motion takes an edge through a triangle. Parts that are farther from each other
+/// keep the whole distance.
 #[test]
 fn neighbours_of_a_thick_sheet_keep_the_guarantee() {
     let (surface, flat) = sheet(6, 0);
@@ -262,8 +262,8 @@ fn neighbours_of_a_thick_sheet_keep_the_guarantee() {
     }
 }
 
-/// A thing that grows by d presses like one that is larger by d, and the way that it has yet to go changes
-/// forces as its stiffness says.
+/// A thing that grows by d presses like one that is larger by d. Its remaining way changes forces as its
+/// stiffness says.
 #[test]
 fn what_grows_presses_like_what_is_larger() {
     for (thing, larger) in [
@@ -335,8 +335,8 @@ fn a_turning_thing_goes_through_nothing() {
     assert!(time_fraction > 0.1 && time_fraction < 0.5, "{time_fraction}");
 }
 
-/// A search for a fraction elsewhere changes nothing of what was evaluated: neither stiffness nor friction
-/// that lags, nor pairs that are near.
+/// A search for a fraction elsewhere leaves the evaluated state unchanged: stiffness, lagged friction and
+/// near pairs.
 #[test]
 fn a_search_leaves_what_was_evaluated() {
     for thing in things().into_iter().chain(growing(0.002)) {
@@ -369,8 +369,8 @@ fn what_has_no_gap_at_the_start_is_told() {
     assert!(met.iter().any(|one| one.contact == 0 && one.gap.is_none()), "{met:?}");
 }
 
-/// What acts at a place, to the bit and in its order, is what acts there for one who has only just come: the
-/// wide pairs that lists are chosen from do not show, however nodes have moved since they were found.
+/// Collisions at a place are the same, to the bit and in order, whatever motion led there. The wide pairs
+/// that lists are chosen from have no effect, however nodes have moved since they were found.
 #[test]
 fn what_acts_does_not_depend_on_where_one_comes_from() {
     let mut random = Random::new(29);

@@ -1,4 +1,4 @@
-//! Where a point lies by a triangle, and where two edges cross; narrow.wgsl is the twin for devices.
+//! Place of a point relative to a triangle, and crossing of two edges; narrow.wgsl is the twin for devices.
 
 use nalgebra::Vector3;
 use pliant_geometry::barycentric_of_closest;
@@ -8,8 +8,8 @@ pub(crate) const PARALLEL: f64 = 1e-6;
 /// The sine of the angle by which the triangles of an edge may be bent inward and still count as flat.
 pub(crate) const FLAT: f64 = 1e-6;
 
-/// An edge with the nodes across it of the triangles that it is part of: of the one that has its ends in this
-/// order, and of the other one, or the same again at a border.
+/// An edge with the opposite nodes of its triangles. The first belongs to the triangle that has the ends in
+/// this order, the second to the other triangle. At a border both are the same node.
 #[derive(Clone, Copy, Debug)]
 pub struct Edge {
     /// Its ends.
@@ -29,7 +29,7 @@ impl Edge {
     }
 }
 
-/// Whether a point is farther than a distance [m] from the plane of a triangle.
+/// True if a point is farther than a distance [m] from the plane of a triangle.
 #[inline]
 pub(super) fn is_beyond(within: f64, [a, b, c]: &[Vector3<f64>; 3], point: &Vector3<f64>) -> bool {
     let area = (b - a).cross(&(c - a));
@@ -42,16 +42,18 @@ pub(super) struct Above {
     pub normal: Vector3<f64>,
     /// Height [m] over the plane.
     pub height: f64,
-    /// Weights of the point beneath, or of the closest point of the triangle if that is far beside it.
+    /// Weights of the point beneath, or of the closest point of the triangle if the point is far beside the
+    /// triangle.
     pub weights: [f64; 3],
     /// The way [m] from there.
     pub way: Vector3<f64>,
-    /// Whether the point is above or beneath the triangle.
+    /// True if the point is above or beneath the triangle.
     pub is_inner: bool,
 }
 
 impl Above {
-    /// With points that are so far beside the triangle, over its height, as inner ones.
+    /// Finds the place of a point relative to a triangle. Points beside the triangle by up to `beside` of its
+    /// height count as inner ones.
     #[inline]
     pub fn of(corners: &[Vector3<f64>; 3], point: &Vector3<f64>, beside: f64) -> Self {
         let [a, b, c] = corners;
@@ -70,7 +72,7 @@ impl Above {
         Self { normal, height, weights, way, is_inner: false }
     }
 
-    /// Whether the point counts as inner though it is a little beside.
+    /// True if the point counts as inner though it is a little beside the triangle.
     pub fn is_beside(&self) -> bool {
         self.is_inner && self.weights.iter().any(|&weight| weight < 0.0)
     }
@@ -80,8 +82,8 @@ impl Above {
     }
 }
 
-/// Whether a way leads along a normal, or hardly against it: bodies that touch press each other flat, and
-/// what is flat is not left to round-off.
+/// True if a way leads along a normal, or hardly against it. Bodies that touch press each other flat, and
+/// round-off must not decide in a flat contact.
 #[inline]
 fn is_before(normal: &Vector3<f64>, way: &Vector3<f64>) -> bool {
     normal.dot(way) >= -FLAT * way.norm()
@@ -89,14 +91,14 @@ fn is_before(normal: &Vector3<f64>, way: &Vector3<f64>) -> bool {
 
 /// Two edges whose closest points are within both and touch from outside.
 pub(super) struct Across {
-    /// How far along each edge the closest points are, from 0 to 1.
+    /// Place of the closest point on each edge, from 0 to 1.
     pub weights: [f64; 2],
     pub normal: Vector3<f64>,
     pub distance: f64,
 }
 
 impl Across {
-    /// If they are no farther than a distance [m].
+    /// Finds the crossing of two edges, if they are no farther apart than a distance [m].
     pub fn of(
         [first, second]: [&Edge; 2],
         within: f64,
@@ -129,7 +131,8 @@ impl Across {
             return None;
         }
         let distance = normal.dot(&between);
-        // Edges that overlap by more than one of them goes on beyond the other leave each other past its end.
+        // An overlap may exceed the length by which one edge continues past the crossing. The edges then
+        // separate past its end.
         let [s, t] = weights;
         let beyond = (s.min(1.0 - s) * aa.sqrt()).min(t.min(1.0 - t) * bb.sqrt());
         (distance > -beyond).then_some(Self { weights, normal, distance })

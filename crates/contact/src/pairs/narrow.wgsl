@@ -1,9 +1,9 @@
-// Where points lie by triangles, and where edges cross; twin of narrow.rs and of `Pairs::find`. The module
-// around it gives `between(a, b)`, the way [m] from node b to node a before the step; `ring_of(k)`, the other
-// corners, in order, of a triangle around a node, for every second k; `corners_of(row)`, the triangle of a
-// candidate; `at_border(row, corners)`, whether those of its corners that are told are all at borders;
-// `take_pair(row, nodes, weights, normal, distance)`, which notes a pair that is found in the place of its
-// candidate, and `leave_pair(row)`, which notes that there is none; and exact.wgsl.
+// Places of points relative to triangles, and crossings of edges; twin of narrow.rs and of `Pairs::find`. The
+// module around it gives: `between(a, b)`, the way [m] from node b to node a before the step; `ring_of(k)`,
+// the other corners, in order, of a triangle around a node, for every second k; `corners_of(row)`, the
+// triangle of a candidate; `at_border(row, corners)`, true if all the given corners of the triangle are at
+// borders; `take_pair(row, nodes, weights, normal, distance)`, which notes a pair in the place of its
+// candidate; `leave_pair(row)`, which notes that there is no pair; and exact.wgsl.
 //
 // Places are ways from one of the nodes, so that single precision keeps the digits of gaps.
 
@@ -20,11 +20,12 @@ struct Above {
     normal: vec3f,
     // Height over the plane [m].
     height: f32,
-    // Weights of the point beneath, or of the closest point of the triangle if that is far beside it.
+    // Weights of the point beneath, or of the closest point of the triangle if the point is far beside the
+    // triangle.
     weights: vec3f,
     // The way from there [m].
     way: vec3f,
-    // Whether the origin is above or beneath the triangle.
+    // True if the origin is above or beneath the triangle.
     is_inner: bool,
 }
 
@@ -55,7 +56,8 @@ fn closest_of_border(a: vec3f, b: vec3f, c: vec3f) -> vec3f {
     return vec3f(along.z, 0.0, 1.0 - along.z);
 }
 
-// With points that are so far beside the triangle, over its height, as inner ones.
+// Finds the place of the origin relative to a triangle. Points beside the triangle by up to `beside` of its
+// height count as inner ones.
 fn above(a: vec3f, b: vec3f, c: vec3f, beside: f32) -> Above {
     let area = cross(b - a, c - a);
     let normal = unit(area);
@@ -70,7 +72,7 @@ fn above(a: vec3f, b: vec3f, c: vec3f, beside: f32) -> Above {
     return Above(normal, height, closest, -(closest.x * a + closest.y * b + closest.z * c), false);
 }
 
-// Whether the origin counts as inner though it is a little beside.
+// True if the origin counts as inner though it is a little beside the triangle.
 fn is_beside(here: Above) -> bool {
     return here.is_inner && any(here.weights < vec3f(0.0));
 }
@@ -85,8 +87,9 @@ fn node_outward(node: u32, first: u32, end: u32) -> vec3f {
     return unit(area);
 }
 
-// Finds what a node touches among the triangles of its candidates, from one row to another: `ring` tells
-// those around it; no farther than `within` [m]. `reach` and `depth` [m] are those of the lists.
+// Finds the contacts of a node among the triangles of its candidates, from one row to another. `ring` is the
+// range of the triangles around the node. No contact is farther than `within` [m]. `reach` and `depth` [m]
+// are the values of the lists.
 fn find_above(node: u32, ring: vec2u, first: u32, end: u32, within: f32, reach: f32, depth: f32) {
     var outward = vec3f(0.0);
     var is_oriented = false;
@@ -152,10 +155,10 @@ fn find_above(node: u32, ring: vec2u, first: u32, end: u32, within: f32, reach: 
         }
     }
     if faces && nearest < min(over, hidden) * (1.0 - SAME) - ROUNDING * reach {
-        // In one plane with a triangle, beside it, is not beneath it.
+        // A node in the plane of a triangle, but outside the triangle, is not beneath it.
         let least = (SAME * nearest + ROUNDING * reach) * norm(nearest_normals);
         let is_behind = dot(nearest_way, nearest_normals) < -least;
-        // Who is behind a border is beside the surface.
+        // A node behind a border is beside the surface.
         if !(is_behind && at_border(nearest_row, nearest_weights != vec3f(0.0))) {
             let sign = select(1.0, -1.0, is_behind);
             let normal = select(unit(nearest_normals), sign * unit(nearest_way), nearest > ON * depth);
@@ -175,7 +178,7 @@ fn find_above(node: u32, ring: vec2u, first: u32, end: u32, within: f32, reach: 
     if beneath_row == NO_ROW {
         return;
     }
-    // Whoever is inside leaves by the shortest way.
+    // A node inside leaves by the shortest way.
     let leaves_elsewhere = -beneath > hidden && -beneath > SLIGHT * depth;
     if leaves_elsewhere || -beneath < over {
         for (var row = first; row < end; row++) {
@@ -188,7 +191,7 @@ fn find_above(node: u32, ring: vec2u, first: u32, end: u32, within: f32, reach: 
     }
 }
 
-// Whether a way leads along a normal, or hardly against it.
+// True if a way leads along a normal, or hardly against it.
 fn is_before(normal: vec3f, way: vec3f) -> bool {
     return dot(normal, way) >= -FLAT * norm(way);
 }
@@ -228,15 +231,16 @@ fn find_crossing(row: u32, nodes: vec4u, across: vec4u) {
         }
     }
     let distance = dot(normal, apart);
-    // Edges that overlap by more than one of them goes on beyond the other leave each other past its end.
+    // An overlap may exceed the length by which one edge continues past the crossing. The edges then separate
+    // past its end.
     let ends = min(weights, vec2f(1.0) - weights) * vec2f(root(squares.x), root(squares.y));
     if distance > -min(ends.x, ends.y) {
         take_pair(row, nodes, vec4f(1.0 - weights.x, weights.x, weights.y - 1.0, -weights.y), normal, distance);
     }
 }
 
-// The sum of the outward normals of the triangles of an edge, from the ways from its first end to its other
-// one and to the nodes across.
+// Returns the sum of the outward normals of the triangles of an edge. The arguments are the ways from its
+// first end to its other end and to the opposite nodes.
 fn edge_outward(along: vec3f, left: vec3f, right: vec3f, is_border: bool) -> vec3f {
     return unit(cross(along, left)) + select(unit(cross(along, -right)), vec3f(0.0), is_border);
 }

@@ -19,8 +19,8 @@ fn found(pairs: &Pairs, places: &[Vector3<f64>]) -> Vec<Pair> {
     all
 }
 
-/// Two sheets that face each other, shifted: distances and normals are those of the planes, weights give the
-/// way between the points, and lists hold while nodes move by less than half of the skin.
+/// Two sheets that face each other, shifted. Distances and normals are the values of the planes, and weights
+/// give the way between the points. Lists hold while nodes move by less than half of the skin.
 #[test]
 fn sheets_that_face_each_other_are_seen_with_their_distance() {
     let (low, mut places) = square(3, true, 0);
@@ -36,7 +36,7 @@ fn sheets_that_face_each_other_are_seen_with_their_distance() {
             [true, false].map(|of| all.iter().filter(|p| (p.weights[0] == 1.0) == of).count());
         assert!(points >= 18 && edges >= 10, "{points} {edges}");
         for pair in all {
-            // Nodes beside a border are as far from it as they are beside it.
+            // The pair of a node outside a border has its distance from the border.
             if pair.normal.z.abs() < 0.9 {
                 assert!(pair.distance > 0.19, "{pair:?}");
                 continue;
@@ -50,14 +50,14 @@ fn sheets_that_face_each_other_are_seen_with_their_distance() {
             assert_eq!(pair.in_order, pair.nodes[0] < 16);
         }
     }
-    // Looked at from behind, there is nothing to touch.
+    // Seen from behind, there is nothing to touch.
     places[16..].iter_mut().for_each(|place| place.z = -0.9);
     pairs.update(|node| places[node as usize]);
     assert!(found(&pairs, &places).is_empty());
 }
 
-/// A sheet that begins askew above another one, at its lower side nearer than both keep: nodes there keep the
-/// distance that they have, so that no pair is pushed apart, and others the whole.
+/// A sheet begins askew above another one, at its lower side nearer than both keep. Nodes there keep the
+/// distance that they have, so that no pair is pushed apart. Other nodes keep the whole distance.
 #[test]
 fn what_is_nearer_at_the_start_keeps_that_distance() {
     let (low, mut places) = square(6, true, 0);
@@ -95,8 +95,8 @@ fn what_is_nearer_at_the_start_keeps_that_distance() {
     assert!(least < 0.1, "{least}");
 }
 
-/// Pairs at some places are those of lists made at these places, and of lists with a larger skin, to the last
-/// bit.
+/// Pairs at some places are the same, to the last bit, from lists made at these places and from lists with a
+/// larger skin.
 #[test]
 fn pairs_do_not_depend_on_when_lists_are_made() {
     let (low, mut rest) = square(6, true, 0);
@@ -145,8 +145,8 @@ fn pairs_do_not_depend_on_when_lists_are_made() {
     }
 }
 
-/// A corner that comes down on the border of a square is above that; of the wall beneath, in one plane with
-/// the corner's own wall, it is none.
+/// A corner that comes down on the border of a square is above the square. It makes no pair with the wall
+/// beneath, which is in one plane with the corner's wall.
 #[test]
 fn walls_in_one_plane_do_not_touch() {
     // The upper side and the wall x = 0 of a block, and a corner with three sides that faces down and to −x.
@@ -170,8 +170,8 @@ fn walls_in_one_plane_do_not_touch() {
     }
 }
 
-/// A sheet folded like a U touches itself across the fold, not beside it; the sides of a thin plate do not
-/// touch through it.
+/// A sheet folded like a U touches itself across the fold only, not along it; the sides of a thin plate do
+/// not touch through it.
 #[test]
 fn a_folded_sheet_touches_itself_across_the_fold_only() {
     let (sheet, flat) = square(8, true, 0);

@@ -9,7 +9,7 @@ use pliant_contact::touch::{LEFT, MARGIN, Passage, Rigid};
 
 use super::rows::Row;
 
-/// How much farther than nodes count as near they are listed, over that margin.
+/// Distance beyond the margin up to which nodes are listed, as a multiple of the margin.
 const SKIN: f64 = 1.0;
 
 /// A surface at a rigid thing.
@@ -22,18 +22,18 @@ pub(super) struct AtRigid {
     /// Distance [m] at which a node at rest still counts as near.
     pub margin: f64,
     pub passage: Passage,
-    /// Whether it is a jaw that holds what touches it.
+    /// True if the thing is a jaw that holds what touches it.
     pub grips: bool,
-    /// Nodes that may touch the thing in the step, and those of faces that may; increasing.
+    /// Nodes that may touch the thing in the step, and nodes of faces that may; increasing.
     pub near: Vec<u32>,
     listed: Listed,
 }
 
-/// What may come near a rigid thing, until the surface and the thing have moved too far.
+/// Nodes and faces that may come near a rigid thing, until the surface and the thing have moved too far.
 struct Listed {
     /// Distance [m] up to which nodes and faces are listed.
     reach: f64,
-    /// Where and how large the thing was then.
+    /// Pose and size of the thing when the list was made.
     stance: Stance,
     /// Nodes of the surface with the corners of the faces, and faces by their place; increasing.
     nodes: Vec<u32>,
@@ -56,8 +56,9 @@ impl AtRigid {
         }
     }
 
-    /// The gap [m] of a node as it lies in the step, less what may be left of it, and the direction away from
-    /// the thing. `now` is its place before the step, `then` that after it [m].
+    /// Returns the gap [m] of a node as it lies in the step, without the penetration that may remain. Also
+    /// returns the direction away from the thing. `now` is the place [m] before the step, `then` the place
+    /// after it.
     pub fn gap(
         &self,
         rigid: &Rigid,
@@ -73,8 +74,8 @@ impl AtRigid {
         (gap, normal)
     }
 
-    /// Whether the list has all that may come nearer than a room [m] in the passage, of nodes that have moved
-    /// by no more than this [m] since.
+    /// True if the list has all nodes and faces that may come nearer than `room` [m] in the passage. `moved`
+    /// [m] bounds the motion of the nodes since the list was made.
     pub fn holds(&self, rigid: &Rigid, room: f64, moved: f64) -> bool {
         let Listed { reach, stance, .. } = &self.listed;
         let moved = moved + self.passage.travel_from(rigid, stance);
@@ -86,7 +87,7 @@ impl AtRigid {
         &self.listed.nodes
     }
 
-    /// With what comes near by itself, besides a room [m].
+    /// Returns `room` [m], plus the distance at which nodes at rest count as near, and the thing's travel.
     fn room(&self, room: f64) -> f64 {
         room + self.margin + self.passage.travel()
     }
@@ -100,8 +101,8 @@ impl AtRigid {
         if *reach == f64::INFINITY {
             return;
         }
-        // Sampled distances can change faster than a point moves, and those of a half-space that turns
-        // without end.
+        // Sampled distances can change faster than a point moves, and distances to a half-space that turns
+        // change without bound.
         let is_first = *reach == 0.0;
         let grows_evenly = !matches!(rigid.shape, Shape::Grid(_))
             && (is_first || passage.travel_from(rigid, stance).is_finite());
@@ -125,8 +126,8 @@ impl AtRigid {
         near.dedup();
     }
 
-    /// Finds the nodes that may come nearer than a room [m] in the passage, of a list that holds; rows of
-    /// these and of points between them.
+    /// Finds the nodes on a valid list that may come nearer than `room` [m] in the passage. Makes rows of
+    /// these nodes and of points between them.
     pub fn look(
         &mut self,
         rigid: &Rigid,
@@ -179,7 +180,7 @@ impl AtRigid {
     ) {
         let middle = corners.iter().map(|corner| corner.local).sum::<Vector3<f64>>() / 3.0;
         let around = corners.iter().map(|corner| (corner.local - middle).norm()).fold(0.0, f64::max);
-        // No point is nearer than one beside it by more than the way between both.
+        // The distances of two points differ by no more than the distance between the points.
         if corners.iter().all(|corner| corner.distance > room + 2.0 * around) {
             return;
         }
@@ -204,9 +205,9 @@ impl AtRigid {
 /// A node at a thing.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Seen {
-    /// Its place in the frame of the thing at the end of the step [m].
+    /// Place of the node in the frame of the thing at the end of the step [m].
     local: Vector3<f64>,
-    /// Its distance from it [m].
+    /// Distance of the node from the thing [m].
     distance: f64,
 }
 
@@ -240,8 +241,7 @@ mod tests {
         (Surface { faces: faces.collect(), nodes: nodes.clone() }, nodes.into_iter().map(place).collect())
     }
 
-    /// The rows of a step are those of lists made in this step, however the sheet waves and the thing moves
-    /// and turns.
+    /// Lists made in each step give the same rows, however the sheet waves and the thing moves and turns.
     #[test]
     fn lists_leave_nothing_out() {
         let (surface, rest) = sheet();

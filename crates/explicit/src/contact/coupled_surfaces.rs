@@ -16,12 +16,13 @@ pub(super) struct CoupledSurfaces {
     ways: Vec<[Vector<f64>; 2]>,
     /// Shares of that time at the beginning and the end of the step.
     time_fractions: [f64; 2],
-    /// On each since it was led [N s].
+    /// Impulse [N s] on each node since the nodes were led.
     impulses: Vec<Vector<f64>>,
 }
 
 impl CoupledSurfaces {
-    /// Those with these places at rest [m], of a model with so many nodes; they stay until they are led.
+    /// Coupled nodes with these places at rest [m], in a model with `first` nodes of its own. They stay until
+    /// they are led.
     pub fn new(first: usize, rest: &[Vector<f64>]) -> Self {
         Self {
             first,
@@ -32,12 +33,12 @@ impl CoupledSurfaces {
         }
     }
 
-    /// Where one is at rest [m], by its number.
+    /// Returns the place [m] at rest of a coupled node, by its number.
     pub fn rest(&self, number: usize) -> Vector3<f64> {
         self.ways[number - self.first][0].into()
     }
 
-    /// Its place among the coupled nodes; `None` of a node of the model.
+    /// Returns the place of a node among the coupled nodes; `None` for a node of the model.
     pub fn place_of(&self, number: u32) -> Option<usize> {
         (number as usize).checked_sub(self.first)
     }
@@ -68,7 +69,7 @@ impl CoupledSurfaces {
         from.lerp(&to, time_fraction)
     }
 
-    /// Where a coupled node goes; `None` of a node of the model.
+    /// Returns the motion of a coupled node; `None` for a node of the model.
     pub fn free(&self, number: u32) -> Option<Free> {
         let coupled = self.place_of(number)?;
         Some(Free { then: self.at(coupled, self.time_fractions[1]).into(), mobility: [0.0; 3] })
@@ -88,7 +89,7 @@ impl CoupledSurfaces {
         }
     }
 
-    /// Where a node is before the step [m], by its number and its place at rest.
+    /// Returns the place [m] of a node before the step, by its number and its place at rest.
     pub(crate) fn place_at<R: LaneNumber>(
         &self,
         number: u32,

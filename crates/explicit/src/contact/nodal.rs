@@ -1,5 +1,4 @@
-//! What contacts do to single nodes: forces, [pressures](pliant_contact::pressure), gaps, and how far nodes
-//! slide.
+//! Results of contacts at single nodes: forces, [pressures](pliant_contact::pressure), gaps and slips.
 
 use nalgebra::Vector3;
 use pliant_contact::pressure::pressures;
@@ -16,7 +15,7 @@ const LASTS: f64 = 0.1;
 /// A node of a surface that may touch, at an instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NodeContact {
-    /// Its number in the model.
+    /// Number of the node in the model.
     pub node: u32,
     /// Sum of the forces of contacts on it [N].
     pub force: Vector<f64>,
@@ -25,13 +24,13 @@ pub struct NodeContact {
     /// Least signed distance to what it may touch, less the distance that is kept [m]; `None` where no body
     /// and no thing is near.
     pub gap: Option<f64>,
-    /// How far it has slid since its touch began [m]; `None` where it touches nothing.
+    /// Distance [m] slid since the touch began; `None` if the node touches nothing.
     pub slip: Option<f64>,
 }
 
 impl<R: LaneNumber> ContactSolver<R> {
-    /// All nodes that may touch, increasing, at the instant whose forces were found last. `state` is that of
-    /// the model then.
+    /// Returns all nodes that may touch, increasing, at the instant whose forces were found last. `state` is
+    /// the state of the model at that instant.
     pub fn nodal(&self, state: &State<R>) -> Vec<NodeContact> {
         let place = |(rest, &number): (&Vector3<f64>, &u32)| {
             self.coupled_surfaces.place_at(number, rest, &state.displacement)
@@ -153,7 +152,7 @@ impl<R: LaneNumber> ContactSolver<R> {
     }
 }
 
-/// How far [m] a node has slid, by its number.
+/// Returns the distance [m] that a node has slid, by its number.
 fn way_of(slip: &[(u32, f64)], node: u32) -> Option<f64> {
     slip.binary_search_by_key(&node, |&(known, _)| known).ok().map(|at| slip[at].1)
 }

@@ -1,4 +1,4 @@
-//! Rows: pairs of points that may touch, with their impulses, and those of a node alone.
+//! Rows: pairs of points that may touch, with their impulses, and rows of single nodes.
 
 use nalgebra::Vector3;
 use pliant_contact::touch::{Contacts, PASSES, SIDES};
@@ -10,7 +10,7 @@ const IDLE: f64 = 0.999;
 /// The change of an impulse, over itself, at which it stays as it is until its nodes move.
 const SETTLED: f64 = 1e-9;
 
-/// No row.
+/// Marks the absence of a row.
 pub(super) const NONE: u32 = u32::MAX;
 
 /// A pair of points that may touch.
@@ -18,7 +18,7 @@ pub(super) struct Row {
     pub contact: usize,
     pub nodes: [u32; 4],
     pub weights: [f64; 4],
-    /// How many nodes take part.
+    /// Number of nodes that take part.
     pub count: usize,
     pub normal: Vector3<f64>,
     /// The gap [m] as predicted, and Σ cᵢ xᵢ [m] then.
@@ -32,7 +32,7 @@ pub(super) struct Row {
     pub drag: Vector3<f64>,
     /// 1 if the impulse acts on the first surface of the contact, −1 if on the second.
     pub sign: f64,
-    /// Of a row on a node alone: the next one.
+    /// Next row on the same node, for a row on a single node.
     pub next: u32,
     /// Σ |cᵢ| sᵢ [m] of the ways sᵢ of its nodes up to which its impulse stays as it is.
     pub idle_to: f64,
@@ -78,7 +78,7 @@ impl Row {
         }
     }
 
-    /// [`push_apart`](Self::push_apart) of so many nodes: loops of a length that the compiler knows take less
+    /// [`push_apart`](Self::push_apart) for `N` nodes: loops of a length known to the compiler take less
     /// time.
     fn push_parts<const N: usize>(&mut self, nodes: &mut [Node], contacts: &Contacts) -> f64 {
         let parts: [(usize, f64); N] = std::array::from_fn(|k| (self.nodes[k] as usize, self.weights[k]));
@@ -136,8 +136,8 @@ impl Row {
     }
 }
 
-/// Of the rows of a contact on a node alone, one without an impulse, or a new one; `None` if there are as
-/// many as can be.
+/// Returns a row of a contact on a single node, either one without an impulse or a new one; `None` if the
+/// node has the most rows allowed.
 pub(super) fn idle(rows: &mut Vec<Row>, node: &mut Node, new: Row) -> Option<u32> {
     let (mut next, mut last, mut count) = (node.first, NONE, 0);
     while let Some(row) = rows.get(next as usize) {
@@ -156,7 +156,7 @@ pub(super) fn idle(rows: &mut Vec<Row>, node: &mut Node, new: Row) -> Option<u32
     })
 }
 
-/// Takes back the impulses of a contact on a node alone; the last such row, if there are any.
+/// Takes back the impulses of a contact on a single node. Returns the last such row, if there are any.
 pub(super) fn take_back(rows: &mut [Row], node: &mut Node, contact: usize) -> Option<u32> {
     let (mut next, mut last) = (node.first, None);
     while let Some(row) = rows.get_mut(next as usize) {

@@ -1,5 +1,5 @@
-//! How far nodes go and have gone, over all of them at once: no contact looks at a node that is too far from
-//! all things.
+//! Bounds on the motion of nodes, over all of them at once, so that no contact looks at a node far from all
+//! things.
 
 use std::ops::Range;
 
@@ -18,7 +18,7 @@ pub(crate) struct Nodes<'a, R> {
     pub displacement: &'a [Vector<R>],
     /// The increment that led there [m].
     pub increment: &'a [Vector<R>],
-    /// The length of the step over that of the one before.
+    /// Length of the step over the length of the step before.
     pub ratio: f64,
     pub processor: Processor,
 }
@@ -63,7 +63,7 @@ impl<R: LaneNumber> LaneWork<R> for Largest<'_, R> {
     }
 }
 
-/// Takes the squares of differences where they are larger.
+/// Raises `most` to the squares of differences where these are larger.
 #[inline(always)]
 fn take_larger<R: LaneNumber>(most: &mut [R; WIDTH], a: &[R], b: &[R]) {
     for (most, (&a, &b)) in most.iter_mut().zip(a.iter().zip(b)) {

@@ -8,22 +8,22 @@
 //! The increments become Δuⁿ⁺¹ = Δuⁿ + Δt²/m (R − f − D). D costs no evaluation of forces. It has no sum over
 //! a body, as f has none, and is zero in rigid translation.
 //!
-//! *η dissipates the highest modes.* Lightly damped bodies otherwise go into parametric resonance: a slow
+//! *η dissipates the highest modes.* Lightly damped bodies otherwise go into parametric resonance. A slow
 //! vibration changes their stiffness, and modes near the critical time step grow from round-off until cells
-//! invert. f* extrapolates the internal forces, so with equal steps the force is η δ²f. At η = 1/27 this is
-//! the explicit scheme of Hulbert and Chung (1996) with ρ_b = ½, and at η = 0 central differences. For a mode
-//! of frequency ω and Ω = ω Δt the characteristic polynomial is z (z − 1)² + Ω² ((1 + η) z² − 2 η z + η). A
-//! resolved mode loses ½ η Ω⁴ of its amplitude in a step, so the scheme is accurate to second order: 2.5e-7
-//! at Ω = 0.1, 0.25 % at Ω = 1, 2.8 % at 0.9 of the critical time step. That falls by the factor 1/√(1 + 4
-//! η), 1 %. The moment of the force is of fourth order in the angle of a step. The page
-//! `docs/lab/performance.md` compares it with shorter steps and with damping of first order.
+//! invert. The force f* extrapolates the internal forces, so with equal steps its part of D is η δ²f. At η =
+//! 1/27 this is the explicit scheme of Hulbert and Chung (1996) with ρ_b = ½, and at η = 0 central
+//! differences. Let a mode have the frequency ω, and Ω = ω Δt. Its characteristic polynomial is z (z − 1)² +
+//! Ω² ((1 + η) z² − 2 η z + η). A resolved mode loses ½ η Ω⁴ of its amplitude in a step, so the scheme is
+//! accurate to second order: 2.5e-7 at Ω = 0.1, 0.25 % at Ω = 1, 2.8 % at 0.9 of the critical time step. The
+//! critical time step falls by the factor 1/√(1 + 4 η), 1 %. The moment of the force is of fourth order in
+//! the angle of a step. `docs/lab/performance.md` compares this force with shorter steps.
 //!
-//! *β damps by stiffness*: β ḟ by the difference to the instant before. That is β K v of the tangent K and
-//! the velocities half a step ago, of any law and element. A mode of angular frequency ω is damped with the
+//! *β damps by stiffness*: β ḟ by the difference to the instant before. For any law and element this is β K v
+//! with the tangent K and the velocities half a step ago. A mode of angular frequency ω is damped with the
 //! ratio ξ = βω/2. The scheme is stable while ω² Δt² + 2 β ω² Δt ≤ 4, that is up to Δt = (2/ω) (√(1 + ξ²) −
 //! ξ) ([`damped`]; Belytschko, Liu and Moran 2000, 6.2). Nodal forces turn with a body. So a rigid rotation
-//! of angular velocity Ω is damped at the rate β Ω², and the stress of a turning body is that which it has β
-//! later. What a relaxing law loses counts as a change of its forces, too.
+//! of angular velocity Ω is damped at the rate β Ω². A turning body has the stress of the time β later. A
+//! stress that a relaxing law loses counts as a change of its forces, too.
 
 use pliant_mechanics::tensor::Vector;
 

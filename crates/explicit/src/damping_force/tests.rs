@@ -33,8 +33,8 @@ fn oscillator() -> Model {
     model
 }
 
-/// By which factor the amplitude of a mode changes in a step, at Ω: a root of the characteristic polynomial
-/// by Newton's method.
+/// Returns the factor on the amplitude of a mode in a step, at Ω. Newton's method finds it as a root of the
+/// characteristic polynomial.
 fn expected(omega: f64) -> f64 {
     let (eta, square) = (DISSIPATION, omega * omega);
     let mut z = Complex::from_polar(1.0, 2.0 * (0.5 * omega).asin());
@@ -47,8 +47,8 @@ fn expected(omega: f64) -> f64 {
     z.norm()
 }
 
-/// The largest displacement of the node [m] over some steps in the first and in the last ones of a run, and
-/// the energies at its end.
+/// Returns the largest displacement of the node [m] in the first and in the last steps of a run, and the
+/// energies at its end.
 fn run(omega: f64, steps: usize) -> ([f64; 2], pliant_mechanics::Energies) {
     let model = oscillator();
     // 2/ω.
@@ -134,7 +134,7 @@ fn kept(model: &Model, step: f64, steps: usize) -> f64 {
     stepper.energies().kinetic / first
 }
 
-/// Of any element: below the critical time step that is found all vibrations decay, above it they grow.
+/// For any element all vibrations decay below the critical time step found, and grow above it.
 #[test]
 fn the_critical_time_step_is_that_of_the_damped_scheme() {
     for model in every_element() {
@@ -153,7 +153,7 @@ fn the_critical_time_step_is_that_of_the_damped_scheme() {
 }
 
 /// A mass on a bar decays by √(1 − βω²Δt) each step, as the scheme says, which is its ratio βω/2 where steps
-/// are short. What is lost is damping.
+/// are short. The energy lost is damping.
 #[test]
 fn a_vibration_decays_with_its_ratio() {
     let mut model = Model::default();
@@ -297,7 +297,7 @@ fn steps_are_cut_where_damping_and_stiffness_together_ask_for_it() {
     }
 }
 
-/// Another stepper goes on from a state with the same bits, and single precision follows double.
+/// Another stepper continues from a state with the same bits, and single precision follows double.
 #[test]
 fn a_state_has_all_that_damping_needs() {
     let model = distorted_cube("tet4-anp", laws()[1]);

@@ -42,7 +42,7 @@ impl Extremes {
     }
 }
 
-/// What the search of a load step knows.
+/// Estimates that the search of a load step keeps.
 pub(super) struct Search {
     /// The estimate of the slowest mode's squared frequency.
     pub(super) slowest: f64,
@@ -67,7 +67,7 @@ impl Default for Search {
 }
 
 impl Search {
-    /// Takes note of a residual; `ramped` under the whole load. Whether the motion is to start anew.
+    /// Notes a residual; `ramped` is set under the whole load. Returns true if the motion is to start anew.
     pub(super) fn runs_away(&mut self, residual: f64, ramped: bool) -> bool {
         let runs_away = ramped && residual > RUNAWAY * self.least;
         self.least = if runs_away { residual } else { self.least.min(residual) };
@@ -93,7 +93,7 @@ impl Search {
     }
 }
 
-/// What a search in single precision knows of its displacements.
+/// Estimates of the displacement error that a search in single precision keeps.
 #[derive(Default)]
 pub(super) struct Accuracy {
     /// The last parts of the way that were left.
@@ -116,7 +116,8 @@ impl Accuracy {
         self.left.iter().sum::<f64>().abs() / self.left.len().max(1) as f64
     }
 
-    /// Whether displacements, asked for at an equilibrium of the forces, are good enough, or won't become so.
+    /// True if the displacements, at an equilibrium of the forces, are accurate enough, or if the search has
+    /// waited too long.
     pub(super) fn suffices(&mut self, tolerance: f64) -> bool {
         self.waited += 1;
         self.waited > PATIENCE || self.mean() <= tolerance

@@ -1,24 +1,26 @@
-//! Quasi-static equilibrium by adaptive dynamic relaxation (Joldes, Wittek and Miller 2011): a fictitious
-//! damped motion whose masses make every cell equally fast and whose damping follows the slowest mode still
-//! moving, uⁿ⁺¹ = uⁿ + β (uⁿ − uⁿ⁻¹) − α M⁻¹ r, α = 2/(2+c), β = (2−c)/(2+c), c = 2 √(A₀ A_m/(A₀ + A_m)),
-//! A_m = 4, A₀ a running Rayleigh quotient Δuᵀ Δr / Δuᵀ M Δu of the last increment. Masses: m_a = s/n Σ_e V_e
-//! (λ+2μ) Σ|B|² over the cells at a node, n nodes per cell, s = 1.25.
+//! Quasi-static equilibrium by adaptive dynamic relaxation (Joldes, Wittek and Miller 2011). The nodes make a
+//! fictitious damped motion, uⁿ⁺¹ = uⁿ + β (uⁿ − uⁿ⁻¹) − α M⁻¹ r. Here α = 2/(2+c) and β = (2−c)/(2+c). The
+//! masses make every cell equally fast. The damping follows the slowest mode still moving: c = 2 √(A₀
+//! A_m/(A₀ + A_m)) with A_m = 4. A₀ is a running Rayleigh quotient Δuᵀ Δr / Δuᵀ M Δu of the last increment.
+//! Masses: m_a = s/n Σ_e V_e (λ+2μ) Σ|B|² over the cells at a node, n nodes per cell, s = 1.25.
 //!
-//! Time is that of loads, motions and relaxing laws; inertia and damping of the bodies play no part. What
-//! acts at time 0 already comes at once: the first equilibrium is that of the instantaneous laws at time 0,
-//! reached from rest. A load step that fails is tried again in halves, with twice the masses. History is
-//! committed at convergence only: inside a step every trial starts from the history of the step before.
+//! Time is the time of loads, motions and relaxing laws; inertia and damping of the bodies play no part.
+//! Loads and motions that act at time 0 already come at once. The first equilibrium, reached from rest, is
+//! the one of the instantaneous laws at time 0. A load step that fails is tried again in halves, with twice
+//! the masses. History is committed only at convergence: inside a step every trial starts from the history of
+//! the step before.
 //!
-//! *Energies.* Internal is ∫ S:dE: the energy stored by the instantaneous laws, Σ V Ψ, less ∫ (f_Ψ − f)·du
-//! with f_Ψ their force and f the relaxed one, by Simpson's rule over each load step; so it is what is stored
-//! and what relaxing laws have dissipated. External is the work of loads, reactions and prescribed motions,
-//! by the trapezoidal rule over each load step. The two have nothing in common but the displacements. The
-//! error of a trapezium over b, after one over a, is estimated from both: (T_ab − T_a − T_b) b²/(3 a (a +
-//! b)), with a and b the lengths of the ways of all nodes.
+//! *Energies.* Internal energy is ∫ S:dE: the energy Σ V Ψ stored by the instantaneous laws, less ∫ (f_Ψ −
+//! f)·du. Here f_Ψ is the force of the instantaneous laws and f the relaxed one; Simpson's rule integrates
+//! over each load step. So internal energy is the energy stored, and the energy that relaxing laws have
+//! dissipated. External is the work of loads, reactions and prescribed motions, by the trapezoidal rule over
+//! each load step. The two have nothing in common but the displacements. The error of a trapezium over b,
+//! after one over a, is estimated from both: (T_ab − T_a − T_b) b²/(3 a (a + b)), with a and b the lengths of
+//! the ways of all nodes.
 //!
-//! *Error of the displacements.* In double precision |M⁻¹ r|/(ω² |u|), in the norm of M, with ω² of the
-//! slowest mode. In single precision, where round-off fills the residual, from the work of the residual along
-//! the load step.
+//! *Error of the displacements.* In double precision it is |M⁻¹ r|/(ω² |u|), in the norm of M, with ω² of the
+//! slowest mode. In single precision round-off fills the residual, so the error is found from the work of the
+//! residual along the load step.
 
 mod accuracy;
 mod path;
@@ -49,7 +51,7 @@ use crate::stepper::{Observable, owned_only, sum_owned};
 /// Nodes per parallel task.
 const CHUNK: usize = 512;
 /// s: margin of the fictitious masses against stiffening. Doubled when a load step fails: cells at a glued
-/// edge stiffen many times over in compression, and a motion too fast for them turns them inside out.
+/// edge stiffen many times over in compression. A motion too fast for such cells turns them inside out.
 const MASS_MARGIN: f64 = 1.25;
 /// Iterations over which a load step is brought on.
 const RAMP: usize = 200;
@@ -57,10 +59,11 @@ const RAMP: usize = 200;
 const RAMP_DAMPING: f64 = 0.02;
 /// Iterations from one report to the next.
 const REPORT: usize = 20;
-/// Where the residual is below this many tolerances, round-off of single precision makes the slowest mode
-/// look faster than it is.
+/// Multiple of the tolerance below which round-off of single precision makes the slowest mode look faster
+/// than it is.
 const ROUGH: f64 = 10.0;
-/// A way shorter than this part of another one doesn't tell how forces bend along that one.
+/// Least ratio of the lengths of two ways at which the shorter one shows how forces bend along the longer
+/// one.
 const SHORTEST: f64 = 0.1;
 
 /// Finds equilibria of one model. Holds constants, scratch and the [`Equilibrium`] last found; the next one
@@ -91,24 +94,24 @@ pub struct DynamicRelaxation<R> {
     way: Way<R>,
 }
 
-/// The number types of [`DynamicRelaxation`], and what is compiled for them here and not again where a model
+/// Number type of [`DynamicRelaxation`], with the functions compiled for it here and not again where a model
 /// is solved.
 pub trait RelaxedIn: LaneNumber {
-    /// As [`DynamicRelaxation::new`].
+    /// Runs [`DynamicRelaxation::new`].
     #[doc(hidden)]
     fn relaxation(
         model: Arc<Model>,
         settings: RelaxationSettings,
     ) -> Result<DynamicRelaxation<Self>, Contradiction>;
 
-    /// As [`DynamicRelaxation::begin`].
+    /// Runs [`DynamicRelaxation::begin`].
     #[doc(hidden)]
     fn begin(
         relaxation: &mut DynamicRelaxation<Self>,
         state: &mut State<Self>,
     ) -> Result<(), RelaxationError>;
 
-    /// As [`DynamicRelaxation::solve_watched`].
+    /// Runs [`DynamicRelaxation::solve_watched`].
     #[doc(hidden)]
     fn solve(
         relaxation: &mut DynamicRelaxation<Self>,
@@ -150,7 +153,7 @@ macro_rules! relaxed_in {
 relaxed_in!(f32);
 relaxed_in!(f64);
 
-/// At the last equilibrium. Kinetic energy, damping and velocities are none.
+/// Results at the last equilibrium. Kinetic energy, damping and velocities are zero.
 impl<R: RelaxedIn> Observable<R> for DynamicRelaxation<R> {
     fn energies(&self) -> &Energies {
         &self.energies
@@ -210,29 +213,29 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
         })
     }
 
-    /// What is known of the last equilibrium.
+    /// Returns the record of the last equilibrium.
     pub fn equilibrium(&self) -> Equilibrium<R> {
         Equilibrium { energies: self.energies, residual: self.residual.clone(), way: self.way.clone() }
     }
 
-    /// Takes forces [N] from outside, one a node, or none: they and no others act in the equilibria to come
-    /// until they are replaced. Their work is external.
+    /// Replaces the forces [N] from outside, one per node, or none. They act in the coming equilibria until
+    /// they are replaced. Their work is external.
     pub fn push(&mut self, forces: &[Vector<f64>]) {
         self.applied.push(forces);
     }
 
-    /// Takes up an equilibrium of the same model, so that all that can be asked belongs to it.
+    /// Resumes from an equilibrium of the same model, so that all results belong to it.
     pub fn resume(&mut self, Equilibrium { energies, residual, way }: Equilibrium<R>) {
         (self.energies, self.residual, self.way) = (energies, residual, way);
     }
 
-    /// How the last equilibrium was reached.
+    /// Returns the way to the last equilibrium.
     pub fn way(&self) -> &Way<R> {
         &self.way
     }
 
-    /// Brings a state at time 0 to its equilibrium there, if any load or motion acts then already; else
-    /// nothing happens, and neither where that is done. [`solve`](Self::solve) does it first.
+    /// Brings a state at time 0 to its equilibrium there, if any load or motion acts then already. Does
+    /// nothing otherwise, or if the equilibrium was found before. [`solve`](Self::solve) does this first.
     ///
     /// # Errors
     /// If no equilibrium is found, however small the parts in which loads and motions are brought on.
@@ -258,8 +261,7 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
         self.stop = flag.clone();
     }
 
-    /// Brings a state to the equilibrium at a later time [s]. On failure the state is that of the last
-    /// equilibrium.
+    /// Brings a state to the equilibrium at a later time [s]. On failure the state is the last equilibrium.
     ///
     /// # Errors
     /// If no equilibrium is found in load steps of the least allowed size.
@@ -267,7 +269,7 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
         self.solve_watched(state, time, &mut |_| ())
     }
 
-    /// The same, telling now and then how far it is.
+    /// Runs like [`solve`](Self::solve), with a report of progress to `watch` every few iterations.
     ///
     /// # Errors
     /// If no equilibrium is found in load steps of the least allowed size.
@@ -292,7 +294,7 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
         Ok(convergence)
     }
 
-    /// Goes from one place of a path to another, in as many parts as it takes.
+    /// Advances from one place of a path to another, in as many parts as needed.
     fn approach(
         &mut self,
         state: &mut State<R>,
@@ -413,8 +415,8 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
         })
     }
 
-    /// The error of the displacements over themselves by the slowest mode, that of a squared frequency: |M⁻¹
-    /// r|/(ω² |u|) in the norm of the masses.
+    /// Returns the relative error of the displacements, |M⁻¹ r|/(ω² |u|) in the norm of the masses. `slowest`
+    /// is ω², the squared frequency of the slowest mode.
     fn error_of_slowest(&self, state: &State<R>, slowest: f64) -> f64 {
         let (mut left, mut size) = (0.0, 0.0);
         for (node, u) in state.displacement.iter().enumerate() {
@@ -430,8 +432,8 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
         if error.is_finite() { error } else { 0.0 }
     }
 
-    /// The work of the residual along the load step over that of the forces from outside: the part of the way
-    /// that is left, in which round-off averages out.
+    /// Returns the part of the way that is left. It is the work of the residual along the load step over the
+    /// work of the forces from outside. Round-off averages out in this work.
     fn left_along_the_way(&self, forces: &InternalForces<R>, state: &State<R>, start: &Start<R>) -> f64 {
         let (mut left, mut work) = (0.0, 0.0);
         for (node, (u, u0)) in state.displacement.iter().zip(&start.displacement).enumerate() {
@@ -557,8 +559,8 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
         self.model.follow(&mut state.displacement);
     }
 
-    /// Adds to the residual the forces of collective constraints, from where their nodes would go without
-    /// more of them.
+    /// Adds to the residual the forces of collective constraints, from the places that their nodes would
+    /// reach without more such forces.
     fn bind(&mut self, state: &State<R>, [alpha, beta]: [R; 2], Instant { time, part }: Instant) {
         let Self { model, collectives, bound, residual, increment, mass, owners, .. } = self;
         for own in collectives {
@@ -588,7 +590,7 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
         }
     }
 
-    /// Takes the forces of collective constraints out of the residual: it is internal minus applied force
+    /// Removes the forces of collective constraints from the residual: it is internal minus applied force
     /// again.
     fn unbind(&mut self) {
         for (residual, bound) in self.residual.iter_mut().zip(&self.bound) {
@@ -596,8 +598,8 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
         }
     }
 
-    /// What means of faces and enclosed volumes bear [N], of what each node resists with beyond what is
-    /// applied: work from outside.
+    /// Returns the forces [N] that mean constraints on faces and enclosed volumes bear: work from outside.
+    /// `resisting` is the force of each node beyond the applied ones.
     fn borne(&self, state: &State<R>, resisting: impl Fn(usize) -> Vector<R>) -> Vec<(u32, Vector<R>)> {
         let place = |node: u32| {
             let node = node as usize;
@@ -660,9 +662,9 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
         state.time = end.time;
     }
 
-    /// ∫ (f_Ψ − f)·du [J] over a load step that came to an equilibrium: what the instantaneous laws would
-    /// have stored, but relaxing ones did not take up. By Simpson's rule; where a cell is inverted halfway on
-    /// the straight line, by the trapezoidal rule.
+    /// Returns ∫ (f_Ψ − f)·du [J] over a load step that came to an equilibrium. This is energy that
+    /// instantaneous laws would have stored, but relaxing ones did not take up. By Simpson's rule; where a
+    /// cell is inverted halfway on the straight line, by the trapezoidal rule.
     fn given_up(
         &mut self,
         forces: &mut InternalForces<R>,
@@ -741,7 +743,7 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
     }
 }
 
-/// How far on the way of a load step the load is at an iteration before [`RAMP`].
+/// Returns the point on the way of a load step that the load has reached at an iteration before [`RAMP`].
 fn brought_on([from, to]: [f64; 2], iteration: usize) -> f64 {
     let s = (iteration + 1) as f64 / RAMP as f64;
     from + (to - from) * s * s * (3.0 - 2.0 * s)
@@ -754,7 +756,7 @@ struct Start<R> {
     outside: Vec<Vector<R>>,
     /// f_Ψ − f [N].
     missing: Vec<Vector<R>>,
-    /// What the instantaneous laws and hourglass control hold [J].
+    /// Energy [J] in the instantaneous laws and hourglass control.
     stored: f64,
 }
 

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::SHORTEST;
 use crate::lanes::LaneNumber;
 
-/// What is known of the equilibrium a state stands at, beside the state: what a restart needs to show it
+/// Record of the equilibrium a state stands at, besides the state: a restart needs it to show the equilibrium
 /// again.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Equilibrium<R> {
@@ -16,7 +16,7 @@ pub struct Equilibrium<R> {
     pub energies: Energies,
     /// Internal minus applied force [N] of each node.
     pub residual: Vec<Vector<R>>,
-    /// How it was reached.
+    /// Way to the equilibrium.
     pub way: Way<R>,
 }
 
@@ -26,25 +26,25 @@ pub struct Way<R> {
     /// Equilibria found.
     #[serde(deserialize_with = "count::read")]
     pub equilibria: u64,
-    /// Estimated error of the external work [J]: the trapezia less the integral. That of a first one is known
-    /// where the next way isn't much shorter.
+    /// Estimated error of the external work [J]: the trapezia less the integral. The error of the first
+    /// trapezium is known if the next way isn't much shorter.
     pub error: Option<f64>,
     /// Estimated error of the displacements over the largest one, at worst.
     pub displacement_error: f64,
-    /// From the last equilibrium but one to the last, of each node: the motion [m] and the change of load and
+    /// Motion [m] of each node from the last equilibrium but one to the last, and its change of load and
     /// reaction [N].
     pub(super) last: Vec<[Vector<R>; 2]>,
 }
 
 impl<R> Way<R> {
-    /// Whether it is one of a model with so many nodes.
+    /// True if the way belongs to a model with `nodes` nodes.
     pub fn fits(&self, nodes: usize) -> bool {
         self.last.len() == if self.equilibria > 0 { nodes } else { 0 }
     }
 }
 
 impl<R: LaneNumber> Way<R> {
-    /// Goes on by motions [m] and changes of the forces from outside [N].
+    /// Extends the way by motions [m] and changes of the forces from outside [N].
     pub(super) fn go_on(&mut self, next: Vec<[Vector<R>; 2]>) {
         let square = |way: &[[Vector<R>; 2]]| -> f64 {
             way.iter().flat_map(|[motion, _]| motion).map(|x| x.to_f64().powi(2)).sum()
@@ -70,15 +70,15 @@ impl<R: LaneNumber> Way<R> {
     }
 }
 
-/// An instant that is sought or passed: the loads and motions of a time [s], or at the start a part of those
-/// of time 0.
+/// Instant that is sought or passed. It has the loads and motions of a time [s], or at the start a part of
+/// those at time 0.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Instant {
     pub(super) time: f64,
     pub(super) part: f64,
 }
 
-/// What grows on the way to the next equilibrium.
+/// Quantity that grows on the way to the next equilibrium.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum LoadPath {
     /// The part of what acts at time 0, from 0 to 1.

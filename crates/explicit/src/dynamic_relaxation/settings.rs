@@ -3,21 +3,21 @@
 use crate::lanes::LaneNumber;
 use crate::step_error::at_corner;
 
-/// Iterations for which a search that has reached its residual goes on for the displacements.
+/// Iterations for which a search that has reached its residual continues for the displacements.
 pub const PATIENCE: usize = 4000;
 
-/// When a load step counts as converged, and when as failed.
+/// Criteria of convergence and of failure of a load step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RelaxationSettings {
     /// Largest residual force on a free component, over the largest internal force.
     pub tolerance: f64,
-    /// Estimated error of the displacements over the largest one, in single precision, where round-off hides
-    /// how far an equilibrium is in the residual of slender bodies: a search goes on for it, though not for
-    /// more than `PATIENCE` iterations.
+    /// Estimated error of the displacements over the largest one, in single precision. Round-off hides the
+    /// distance to the equilibrium in the residual of slender bodies. So a search continues until this error
+    /// is reached, though for no more than `PATIENCE` iterations.
     pub displacement: f64,
     /// Iterations after which a load step has failed.
     pub iterations: usize,
-    /// How often a failed load step may be halved.
+    /// Number of times that a failed load step may be halved.
     pub halvings: u32,
 }
 
@@ -42,7 +42,7 @@ impl Default for RelaxationSettings {
     }
 }
 
-/// Why an equilibrium was not found.
+/// Reason why no equilibrium was found.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RelaxationError {
     /// Still moving after the allowed iterations.
@@ -53,11 +53,11 @@ pub enum RelaxationError {
     NotConverged {
         /// The body of the node of the largest residual.
         body: String,
-        /// That node, numbered in its body.
+        /// Node of the largest residual, numbered in its body.
         node: u32,
         /// The relative residual.
         residual: f64,
-        /// What was asked for.
+        /// Tolerance of the relative residual.
         tolerance: f64,
         /// Iterations spent on the last try.
         iterations: usize,
@@ -75,9 +75,9 @@ pub enum RelaxationError {
         body: String,
         /// The element, numbered as in the user's mesh.
         element: u32,
-        /// Its first node, or that of the corner, numbered in its body.
+        /// First node of the element, or the node of the corner, numbered in its body.
         node: u32,
-        /// Whether it is a corner of a hexahedron, not its middle.
+        /// True if the inversion is at a corner of a hexahedron, not at its middle.
         corner: bool,
         /// det F there.
         determinant: f64,
@@ -110,7 +110,7 @@ pub enum RelaxationError {
 }
 
 impl RelaxationError {
-    /// What to try.
+    /// Returns advice on what to try.
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::Inverted { time, .. } | Self::NotConverged { time, .. } | Self::NotFinite { time, .. }
@@ -129,10 +129,10 @@ impl RelaxationError {
     }
 }
 
-/// How a load step went.
+/// Statistics of a load step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Convergence {
-    /// Iterations, those of failed tries included.
+    /// Iterations, including failed tries.
     pub iterations: usize,
     /// Relative residual at the end.
     pub residual: f64,
@@ -140,7 +140,7 @@ pub struct Convergence {
     pub parts: u32,
 }
 
-/// How far the search for an equilibrium is.
+/// Progress of the search for an equilibrium.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Iteration {
     /// Time [s] of the last equilibrium and of the one that is sought.

@@ -2,13 +2,14 @@
 //! incompressible tissue.
 //!
 //! *Nodal* (Bonet and Burton 1998): J_n = Σ V_e J_e / Σ V_e over the cells at a node, p_n = U'(J_n), p_e the
-//! mean of the cell's four p_n, f_a = V_e (P_iso + p_e cof F) B_a: exactly the gradient of Σ V_e W_iso + Σ
-//! V_n U(J_n). *Variational*: J̄_e the mean of the four J_n, p_e' = U'(J̄_e), p_n their mean weighted by
-//! volume, p_e as above: the gradient of Σ V_e (W_iso + U(J̄_e)). Softer; watch for pressure modes.
-//! *NiftySim* (Joldes, Wittek and Miller 2009): the whole law at F̄ = (J̄_e/J_e)^(1/3) F, f_a = V_e F̄ S(F̄)
-//! B_a. Not the gradient of an energy: for the answers of imported models only.
+//! mean of the cell's four p_n. Forces are f_a = V_e (P_iso + p_e cof F) B_a: exactly the gradient of Σ V_e
+//! W_iso + Σ V_n U(J_n). *Variational*: J̄_e the mean of the four J_n, p_e' = U'(J̄_e), p_n their mean
+//! weighted by volume. The p_e of the cell follows as above: the forces are the gradient of Σ V_e (W_iso +
+//! U(J̄_e)). Softer; watch for pressure modes. *NiftySim* (Joldes, Wittek and Miller 2009): the whole law at
+//! F̄ = (J̄_e/J_e)^(1/3) F, f_a = V_e F̄ S(F̄) B_a. These forces are not the gradient of an energy: use them
+//! only to reproduce the results of imported models.
 //!
-//! Averages are those of one solid: a node on an interface has a J_n for each material.
+//! Averages are taken within one solid: a node on an interface has a J_n for each material.
 
 use pliant_mechanics::law::{AnyLaw, Split};
 use pliant_mechanics::model::{Averaging, CellBlock, LocalNodes, Solid};
@@ -30,22 +31,22 @@ use crate::relaxation::Relaxation;
 
 pub(super) struct AveragedTets<R> {
     processor: Processor,
-    /// Displacements of the nodes of each block, and their average beside them.
+    /// Displacements of the nodes of each block, with the nodal average as the fourth number.
     moved: Moved<R>,
     constants: AveragedConstants<R>,
     /// J_n − 1, then p_n [Pa].
     node_value: Vec<Pack<R>>,
 }
 
-/// What does not change from step to step.
+/// Constants of the elements from step to step.
 struct AveragedConstants<R> {
     law: AnyLaw,
     averaging: Averaging,
     cells: PackedCells<R, 4>,
     rest: Vec<PackedRest<R, 3>>,
-    /// The nodes of all blocks, one block after another, numbered among those of the solid.
+    /// The nodes of all blocks, one block after another, numbered within the solid.
     numbers: Vec<u32>,
-    /// Where the blocks' shares in the average of each node lie.
+    /// Places of the blocks' shares in the average of each node.
     shares: Shares,
     /// 1/V_n with V_n = Σ V_e/4 [1/m³].
     inverse_volume: Vec<R>,
@@ -336,8 +337,8 @@ fn dilated<L: pliant_mechanics::Number>(h: &Tensor<L>, volume_ratio: L, change: 
 }
 
 impl<R: LaneNumber> AveragedConstants<R> {
-    /// The first Piola–Kirchhoff stress: of the law where the deformation is averaged, else of its isochoric
-    /// part and the pressure of the nodes, F S_iso + p cof F.
+    /// Returns the first Piola–Kirchhoff stress. If the deformation is averaged, it comes from the law.
+    /// Otherwise it is F S_iso + p cof F, of the law's isochoric part and the pressure of the nodes.
     #[inline(always)]
     fn piola<L: Lanes<R>>(
         &self,

@@ -19,7 +19,7 @@ use crate::relaxation::Relaxation;
 /// Bars of one solid.
 pub(super) type Bars<R> = OnePass<R, BarConstants<R>>;
 
-/// What does not change from step to step.
+/// Constants of the bars from step to step.
 pub(super) struct BarConstants<R> {
     cells: PackedCells<R, 2>,
     rest: Vec<PackedBar<R>>,
@@ -29,13 +29,13 @@ pub(super) struct BarConstants<R> {
     history: usize,
 }
 
-/// What a pack of bars has at rest; beyond the last bar its rest with no cross section.
+/// Rest geometry of a pack of bars; beyond the last bar a copy of the last one without cross section.
 struct PackedBar<R> {
     /// The second node from the first [m].
     between: Vector<Pack<R>>,
     /// Length [m].
     length: Pack<R>,
-    /// What the length is longer at rest than without force [m].
+    /// Length at rest less the length without force [m].
     longer: Pack<R>,
     /// E over the length without force [Pa/m].
     modulus: Pack<R>,

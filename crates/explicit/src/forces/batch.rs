@@ -1,6 +1,6 @@
 //! Points evaluated together: elements fill in displacement gradients, the law answers with stresses. So an
-//! element is compiled once for each kind of lanes and a law once for each, not every law again in every
-//! element; the choice of the law costs one branch per batch.
+//! element is compiled once for each kind of lanes, and so is a law; no law is compiled again in every
+//! element. The choice of the law costs one branch per batch.
 
 use pliant_mechanics::Number;
 use pliant_mechanics::law::{AnyLaw, Deformation, Law, MOST_FAMILIES, Split, with_law};
@@ -16,12 +16,12 @@ use crate::lanes::{
 /// Packs of points in a batch: few enough for the first cache.
 pub(super) const PACKS: usize = 4;
 
-/// What a law is asked for.
+/// Parts of the stress that a law is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Wanted {
     /// The whole stress.
     Whole,
-    /// The isochoric part of it.
+    /// The isochoric part of the stress.
     Isochoric,
     /// Both parts.
     Parts,
@@ -74,8 +74,8 @@ impl<R: LaneNumber> Batch<R> {
         }
     }
 
-    /// What is wanted of the stresses of the first packs. `fibres` has the directions of each cell, which has
-    /// `points` points one after the other.
+    /// Computes the wanted parts of the stresses of the first packs. `fibres` has the directions of each
+    /// cell, which has `points` points one after the other.
     #[inline(always)]
     pub(crate) fn evaluate<L: Lanes<R>>(
         &mut self,
@@ -94,7 +94,7 @@ impl<R: LaneNumber> Batch<R> {
         load_symmetric(&self.stress[pack], at)
     }
 
-    /// Both parts of it.
+    /// Returns both parts of the stress.
     #[inline(always)]
     pub(super) fn parts<L: Lanes<R>>(&self, pack: usize, at: usize) -> Split<Symmetric<L>> {
         Split { isochoric: self.stress(pack, at), volumetric: load_symmetric(&self.volumetric[pack], at) }
@@ -191,8 +191,8 @@ impl<R: LaneNumber, T: Law> LaneWork<R> for Stresses<'_, R, T> {
     }
 }
 
-/// U'(J) [Pa] of a law whose volumetric stress is J U'(J) C⁻¹, at up to [`PACKS`] packs of J − 1, from its
-/// stress in a pure dilation F = J^(1/3) I.
+/// Computes U'(J) [Pa] of a law whose volumetric stress is J U'(J) C⁻¹, at up to [`PACKS`] packs of J − 1. U'
+/// follows from the law's stress in a pure dilation F = J^(1/3) I.
 #[inline(always)]
 pub(super) fn pressures<R: LaneNumber, L: Lanes<R>>(
     law: &AnyLaw,

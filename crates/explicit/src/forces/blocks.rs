@@ -1,7 +1,7 @@
-//! Cells block by block. A block copies the displacements of its nodes in, adds the forces of its cells up
-//! cell by cell in sums of its own, and leaves these for the nodes: each node adds the few blocks at it up in
-//! their order. So a block works in the first caches, and neither its size nor its sums depend on the number
-//! of threads. No atomic is needed, and all arrays have their final length from the start.
+//! Cells block by block. A block copies in the displacements of its nodes and adds up the forces of its cells
+//! in its own sums. It leaves these sums for the nodes. Each node adds up the few blocks at it in their
+//! order. So a block works in the first caches, and neither its size nor its sums depend on the number of
+//! threads. No atomic is needed, and all arrays have their final length from the start.
 
 use std::ops::Range;
 
@@ -24,13 +24,13 @@ const SPARE: usize = 8;
 /// The most packs of a block.
 pub(super) const MOST_PACKS: usize = BLOCK + SPARE;
 
-/// Nodes of packs of cells, each pack with its own, that are worth a second thread on every machine. 1,000
-/// hexes are below: two threads took 0.68 of the time of one where cores answer each other fast, and 1.15 to
-/// 1.4 of it on the same machine where they did not.
+/// Nodes of packs of cells, each pack with its own nodes, that are worth a second thread on every machine. A
+/// model of 1,000 hexes is smaller. Two threads took 0.68 of the time of one where cores answer each other
+/// fast. They took 1.15 to 1.4 of it on the same machine where cores did not.
 const SHARED: usize = 512;
 
-/// Packs of each block of so many packs of cells with `nodes` nodes. A small model has two, four or six
-/// blocks, so that two threads have as much to do.
+/// Returns the packs of each block, for `packs` packs of cells with `nodes` nodes. A small model has two,
+/// four or six blocks, so that two threads have as much to do.
 fn packs_per_block(packs: usize, nodes: usize) -> usize {
     if packs <= MOST_PACKS && packs * nodes < SHARED {
         return MOST_PACKS;
@@ -49,14 +49,14 @@ pub struct Blocks {
     nodes: Vec<u32>,
     /// First entry of `nodes` of each block, one more than there are blocks.
     offsets: Vec<u32>,
-    /// The most nodes of a block: each has room for so many.
+    /// The most nodes of a block; each block has room for this number.
     stride: usize,
     /// Packs of cells in each block but the last.
     packs: usize,
 }
 
 impl Blocks {
-    /// Of cells in their order, and the number of each cell's nodes in its block.
+    /// Builds the blocks of cells in their order, and the number of each cell's nodes in its block.
     pub(super) fn new<const N: usize>(cells: &[[u32; N]]) -> (Self, Vec<[u16; N]>) {
         let packs = packs_per_block(cells.len().div_ceil(PACK), N);
         let mut blocks = Self { nodes: Vec::new(), offsets: vec![0], stride: 0, packs };
@@ -103,7 +103,7 @@ impl Blocks {
         &self.nodes[self.entries(block)]
     }
 
-    /// Those of a block among the nodes of all blocks, one block after another.
+    /// Returns the range of a block's nodes among the nodes of all blocks, one block after another.
     #[inline(always)]
     pub(super) fn entries(&self, block: usize) -> Range<usize> {
         self.offsets[block] as usize..self.offsets[block + 1] as usize
@@ -128,7 +128,7 @@ impl Blocks {
     }
 }
 
-/// Where the parts of what is summed at each node lie. Most nodes have one part: these come first, without a
+/// Places of the parts of the sum at each node. Most nodes have one part. These parts come first, without a
 /// branch, then the others, in the order of the nodes and of adding.
 #[derive(Clone, Debug)]
 pub(super) struct Shares {
@@ -136,12 +136,13 @@ pub(super) struct Shares {
     first: Vec<u32>,
     /// Further parts, as node and place.
     further: Vec<[u32; 2]>,
-    /// Where in `further` those of every [`PACK`] nodes begin.
+    /// Entry of `further` at which each group of [`PACK`] nodes begins.
     starts: Vec<u32>,
 }
 
 impl Shares {
-    /// Of `count` nodes, from pairs of node and place in the order of adding. The place `none` holds nothing.
+    /// Builds the shares of `count` nodes, from pairs of node and place in the order of adding. The place
+    /// `none` holds nothing.
     pub(super) fn new(count: usize, none: u32, pairs: impl Iterator<Item = (u32, u32)>) -> Self {
         let (mut first, mut further) = (vec![none; count], Vec::new());
         for (node, place) in pairs {
@@ -180,26 +181,26 @@ impl Shares {
     }
 }
 
-/// The displacements [m] of the nodes of each block, beside them a number that some elements need.
+/// Displacements [m] of the nodes of each block, with a fourth number that some elements need.
 #[derive(Clone, Debug)]
 pub(super) struct Moved<R> {
     pub blocks: Blocks,
     vectors: Vec<Quad<R>>,
 }
 
-/// One block at work.
+/// Block at work.
 pub(super) struct Task<'a, R> {
-    /// Which one.
+    /// Number of the block.
     pub block: usize,
-    /// Its nodes.
+    /// Nodes of the block.
     pub nodes: &'a [u32],
-    /// Their displacements [m].
+    /// Displacements [m] of these nodes.
     pub moved: &'a mut [Quad<R>],
     /// The forces [N] of its cells on them.
     pub forces: &'a mut [Quad<R>],
-    /// The history of its cells, empty if there is none.
+    /// History of the block's cells; empty for elastic laws.
     pub history: &'a mut [Pack<R>],
-    /// That of its cells' pressures.
+    /// History of the pressures of the block's cells.
     pub pressures: &'a mut [Pack<R>],
 }
 
@@ -244,7 +245,7 @@ impl<R: LaneNumber> Moved<R> {
     }
 }
 
-/// The history of each block; where there is none, none for each.
+/// Splits the history into its blocks; an empty history gives each block an empty part.
 fn in_blocks<R: LaneNumber>(
     history: &mut [Pack<R>],
     per_block: usize,

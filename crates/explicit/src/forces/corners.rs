@@ -1,11 +1,11 @@
 //! Corners of hexahedra that turn inside out while the cell as a whole, or its Gauss points, does not. The
-//! determinant of the three edges at each corner is judged, of cells that are flat.
+//! determinant of the three edges at each corner is judged, but only in flat cells.
 //!
-//! A uniform-strain hexahedron is looked at closely only where that can be: F at a corner is F̄ + Σ_c q_c ⊗
-//! W_c with the hourglass displacements q_c, and |Σ_c q_c ⊗ W_c| ≤ κ |q|. While κ |q| stays below the least
-//! stretch no corner is inverted; that stretch is at least J/√(λ₁λ₂), and with |C − I|² = S the two largest
-//! eigenvalues of C have √(λ₁λ₂) ≤ 1 + √(S/2), whose square is at most 3/2 (1 + S). So κ² |q|² 3/2 (1 + S) <
-//! J² is enough, which costs five operations a cell.
+//! A uniform-strain hexahedron is looked at closely only if a corner may be inverted: F at a corner is F̄ +
+//! Σ_c q_c ⊗ W_c with the hourglass displacements q_c. The second term is bounded, |Σ_c q_c ⊗ W_c| ≤ κ |q|.
+//! While κ |q| stays below the least stretch no corner is inverted. The least stretch is at least J/√(λ₁λ₂).
+//! With |C − I|² = S the two largest eigenvalues of C have √(λ₁λ₂) ≤ 1 + √(S/2), whose square is at most 3/2
+//! (1 + S). So κ² |q|² 3/2 (1 + S) < J² is enough, which costs five operations a cell.
 
 use pliant_mechanics::Number;
 use pliant_mechanics::element::{FLAT_HEX, HEX_EDGES};
@@ -20,7 +20,7 @@ use crate::lanes::{LaneWork, Lanes, Local, PACK, Pack, load_vector};
 pub(super) struct PackedCorners<R>([Vector<Pack<R>>; 7]);
 
 impl<R: LaneNumber> PackedCorners<R> {
-    /// Where a pack is filled up, those of the last cell again.
+    /// Packs the corners; lanes beyond the last cell repeat it.
     pub(super) fn of<const N: usize>(packed: &PackedCells<R, N>, offsets: &[[Vector<f64>; N]]) -> Vec<Self> {
         let last = packed.count.max(1) - 1;
         let number = |pack: usize, a: usize, c: usize| {
@@ -56,14 +56,15 @@ fn depth_at<N: Number>(x: &[Vector<N>; 8], corner: usize) -> N {
     -dot(cross(sub(x[a], origin), sub(x[b], origin)), sub(x[c], origin))
 }
 
-/// Whether a cell is so flat that its corners count: by its volume over that at rest.
+/// True if a cell is so flat that its corners count. `flatness` is J, for uniform-strain hexahedra over √(1 +
+/// S/2).
 #[inline(always)]
 pub(super) fn is_flat<R: LaneNumber>(flatness: R) -> bool {
     flatness < R::of(FLAT_HEX)
 }
 
-/// The square of what J is divided by for the flatness of a uniform-strain hexahedron, about its least
-/// stretch: nearly incompressible cells keep their volume when they are squeezed flat.
+/// Returns the square of the divisor of J in the flatness of a uniform-strain hexahedron, about its least
+/// stretch. Nearly incompressible cells keep their volume when they are squeezed flat.
 #[inline(always)]
 fn widening<R: LaneNumber>(strain: R) -> R {
     R::ONE + R::of(0.5) * strain
@@ -79,7 +80,7 @@ fn first_folded<R: LaneNumber>(depths: &Pack<R>, flatness: &Pack<R>) -> Option<u
     (0..PACK).find(|&lane| depths.0[lane] >= R::ZERO && is_flat(flatness.0[lane]))
 }
 
-/// Whether one of the cells of a pack may have an inverted corner, from 3/2 κ² |q|², J and |C − I|².
+/// True if a cell of a pack may have an inverted corner, from 3/2 κ² |q|², J and |C − I|².
 #[inline(always)]
 pub(super) fn may_fold<R: LaneNumber>(reach: &Pack<R>, ratio: &Pack<R>, strain: &Pack<R>) -> bool {
     let mut sound = true;
@@ -95,7 +96,7 @@ pub(super) fn may_fold<R: LaneNumber>(reach: &Pack<R>, ratio: &Pack<R>, strain: 
 pub(super) struct CornerCheck<'a, 'l, R, const N: usize, const M: usize> {
     pub corners: &'a PackedCorners<R>,
     pub local: &'a Local<'l, R, N>,
-    /// How flat the cells are.
+    /// Flatness of the cells.
     pub flatness: &'a Pack<R>,
     /// The pack, counted in the block.
     pub pack: usize,

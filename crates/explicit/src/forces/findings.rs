@@ -1,11 +1,11 @@
-//! What is found beside the forces: energies, broken cells, how far cells are deformed.
+//! Findings of a force evaluation besides the forces: energies, broken cells, deformation of the cells.
 
 use serde::{Deserialize, Serialize};
 
 use crate::lanes::LaneNumber;
 use crate::lanes::{PACK, Pack};
 
-/// What a pass over some packs of cells found, lane by lane.
+/// Findings of a pass over some packs of cells, lane by lane.
 #[derive(Clone, Copy, Debug)]
 pub struct Findings<R> {
     /// Energy held by hourglass patterns [J].
@@ -56,7 +56,7 @@ impl Deformed {
         }
     }
 
-    /// Whether the least J or the largest stretch, taken as √(1 + |C − I|), differ by more than a factor.
+    /// True if the least J or the largest stretch, taken as √(1 + |C − I|), differ by more than a factor.
     pub fn differs(&self, other: &Self, factor: f64) -> bool {
         self.change(other) > factor
     }
@@ -69,7 +69,7 @@ impl Deformed {
     }
 }
 
-/// What an evaluation of all cells found.
+/// Findings of an evaluation of all cells.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Found {
     /// Energy held by hourglass patterns [J].
@@ -78,6 +78,6 @@ pub(crate) struct Found {
     pub inverted: Option<(usize, usize, f64)>,
     /// The first hexahedron of which a corner is turned inside out, as (solid, cell).
     pub folded: Option<(usize, usize)>,
-    /// How far the cells are deformed.
+    /// Deformation of the cells.
     pub(crate) deformed: Deformed,
 }

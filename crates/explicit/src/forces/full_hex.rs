@@ -1,5 +1,6 @@
-//! Hexahedra with 2×2×2 Gauss points for the change of shape and one mean dilatation, W = Σ w W_iso(F_g) + V
-//! U(v/V): no hourglass patterns, no locking, eight stresses a cell. The in-house reference for `hex8`.
+//! Hexahedra with 2×2×2 Gauss points for the change of shape and one mean dilatation. Their energy is W = Σ w
+//! W_iso(F_g) + V U(v/V). They have no hourglass patterns and no locking, and take eight stresses a cell. The
+//! in-house reference for `hex8`.
 
 use pliant_mechanics::element::GaussPoints;
 use pliant_mechanics::law::AnyLaw;
@@ -19,7 +20,7 @@ use crate::relaxation::Relaxation;
 
 pub(super) type FullHexes<R> = OnePass<R, FullHexConstants<R>>;
 
-/// What does not change from step to step.
+/// Constants of the elements from step to step.
 pub(super) struct FullHexConstants<R> {
     law: AnyLaw,
     cells: PackedCells<R, 8>,
@@ -32,11 +33,11 @@ pub(super) struct FullHexConstants<R> {
     volumetric_slots: usize,
 }
 
-/// One of the eight points of packs of cells.
+/// Point of packs of cells, one of eight.
 struct Point<R> {
     /// Gradients of the shape functions [1/m], of all nodes but the first.
     gradient: [Vector<Pack<R>>; 7],
-    /// Its volume [m³].
+    /// Volume [m³] of the point.
     weight: Pack<R>,
 }
 

@@ -1,10 +1,10 @@
 //! Resistance of uniform-strain hexahedra to hourglass patterns, f_a = k Σ_c γ_ca q_c with q_c = Σ_b γ_cb
-//! u_b. With γ_ca = Γ_ca − B_a·Y_c, the signs Γ_ca = ±1 of the patterns ηζ, ξζ, ξη, ξηζ and their moments
-//! Y_c = Σ_a Γ_ca X_a it is q_c = Σ_b Γ_cb u_b − H Y_c and f_a = Σ_c Γ_ca k q_c − (k Σ_c q_c ⊗ Y_c) B_a:
-//! thirteen numbers a cell, and the second term of the force goes along with the stress.
+//! u_b. Let γ_ca = Γ_ca − B_a·Y_c, with the signs Γ_ca = ±1 of the patterns ηζ, ξζ, ξη, ξηζ and their moments
+//! Y_c = Σ_a Γ_ca X_a. Then q_c = Σ_b Γ_cb u_b − H Y_c. The force becomes f_a = Σ_c Γ_ca k q_c − (k Σ_c q_c ⊗
+//! Y_c) B_a. A cell stores thirteen numbers, and the second term of the force is added to the stress.
 //!
 //! Where the stiffness grows with the law, k becomes k g(F) ([`ShearGrowth`]). The forces stay the gradient
-//! of an energy, ½ k g Σ |q_c|²: its derivative by F adds ½ k Σ |q_c|² ∂g/∂F to V P. That derivative costs
+//! of an energy, ½ k g Σ |q_c|². Its derivative by F adds ½ k Σ |q_c|² ∂g/∂F to V P. That derivative costs
 //! two more stresses, in batches where g is above 1 and cells bend.
 
 use pliant_mechanics::law::{AnyLaw, Deformation, ShearGrowth};
@@ -49,7 +49,7 @@ impl<R: LaneNumber> Resistance<R> {
         Self([[Pack::ZERO; 3]; 4])
     }
 
-    /// Finds k q_c from the displacements relative to the first node and their gradient; returns the energy ½
+    /// Finds k q_c from the displacements relative to the first node and their gradient. Returns the energy ½
     /// k Σ |q_c|² [J] and 3/2 κ² Σ |q_c|².
     #[inline(always)]
     pub(super) fn find<L: Lanes<R>, const M: usize>(
@@ -69,7 +69,7 @@ impl<R: LaneNumber> Resistance<R> {
         [L::of(0.5) * stiffness * energy, L::load(&control.reach, at) * energy]
     }
 
-    /// Takes a factor g into account.
+    /// Multiplies the resistance by a factor g.
     #[inline(always)]
     fn grow<L: Lanes<R>>(&mut self, factor: L, at: usize) {
         for kq in &mut self.0 {
@@ -78,7 +78,7 @@ impl<R: LaneNumber> Resistance<R> {
         }
     }
 
-    /// Takes Σ_c k q_c ⊗ Y_c from V P.
+    /// Subtracts Σ_c k q_c ⊗ Y_c from V P.
     #[inline(always)]
     pub(super) fn turn<L: Lanes<R>>(&self, control: &PackedHourglass<R>, piola: &mut Tensor<L>, at: usize) {
         for (kq, moment) in self.0.iter().zip(&control.moments) {
@@ -137,8 +137,8 @@ impl<R: LaneNumber> Growth<R> {
     }
 }
 
-/// The search for the growth of a batch of cells, as many packs as there are resistances: g from their
-/// stresses goes into resistance and energy.
+/// Search for the growth of a batch of cells, with one pack per resistance. The factor g from their stresses
+/// scales resistance and energy.
 pub(super) struct FindGrowth<'a, R> {
     pub law: &'a AnyLaw,
     /// Shear modulus at rest [Pa].

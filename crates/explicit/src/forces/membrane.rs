@@ -1,11 +1,11 @@
 //! Membranes: triangles of constant strain in their own plane, in plane stress
-//! (`pliant_mechanics::law::plane_stress`). With the tangents f_i = t_i + Σ u_a (B_a·t_i) and S in the frame
-//! of the triangle, f_a = V (f_i S_ij (B_a·t_j)), V = A₀ t₀.
+//! (`pliant_mechanics::law::plane_stress`). Let f_i = t_i + Σ u_a (B_a·t_i) be the tangents, and S the stress
+//! in the frame of the triangle. Then f_a = V (f_i S_ij (B_a·t_j)) with V = A₀ t₀.
 //!
 //! A law works on batches as for solids, in the gradient that Cholesky's factor of C makes. The stretch
 //! across is found by a search over the whole batch, three or four stresses a cell; an incompressible law
-//! takes one. The incompressible neo-Hookean law, that of most capsules, has a closed form, S = μ (I −
-//! C⁻¹/det C): it goes past batch and Cholesky's factor, in half the time.
+//! takes one. The incompressible neo-Hookean law, the usual one of capsules, has a closed form, S = μ (I −
+//! C⁻¹/det C). This form needs neither batch nor Cholesky's factor, and takes half the time.
 
 use pliant_mechanics::Number;
 use pliant_mechanics::element::Sheet;
@@ -26,13 +26,13 @@ use crate::lanes::LaneNumber;
 use crate::lanes::{Lanes, PACK, Pack, load_vector};
 use crate::relaxation::Relaxation;
 
-/// Where a search ends: a step of so many units in the last place of λ₃ − 1.
+/// Size of the last step of a search, in units in the last place of λ₃ − 1.
 const SEARCHED: f64 = 64.0;
 
 /// The triangles of a membrane.
 pub(super) type Membranes<R> = OnePass<R, MembraneConstants<R>>;
 
-/// What does not change from step to step.
+/// Constants of the membranes from step to step.
 pub(super) struct MembraneConstants<R> {
     law: AnyLaw,
     /// μ [Pa] of the incompressible neo-Hookean law.
@@ -123,9 +123,9 @@ impl<R: LaneNumber> PackedTriangle<R> {
 
 /// The strains of the packs of a batch, and the stretches across.
 struct Walls<R> {
-    /// Of [`InPlane::parts`].
+    /// Parts from [`InPlane::parts`].
     plane: [[Pack<R>; 6]; PACKS],
-    /// Of [`ThicknessSearch::parts`].
+    /// Parts from [`ThicknessSearch::parts`].
     search: [[Pack<R>; 4]; PACKS],
     /// λ₃ − 1 of the stresses in the batch.
     change: [Pack<R>; PACKS],

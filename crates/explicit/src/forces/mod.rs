@@ -8,7 +8,7 @@
 //!
 //! A force field works through batches of four packs of points (`batch.rs`): displacement gradients, then
 //! stresses of the law, then nodal forces. So elements and laws are each compiled once per kind of lanes,
-//! never each law in each element, and the law is chosen once per batch. `plain.rs`: one point per cell, with
+//! never each law in each element. The law is chosen once per batch. `plain.rs`: one point per cell, with
 //! hourglass control from `hourglass.rs`; `averaged.rs`: tets with averaged pressure; `full_hex.rs`: eight
 //! points; `membrane.rs`: triangles in plane stress; `bar.rs`: bars and threads. Every element whose force is
 //! the gradient of an energy runs through the battery in `tests.rs`.
@@ -87,28 +87,28 @@ fn side_by_side<R: LaneNumber>(
     rayon::join(evaluate, || side_by_side(fields, &offsets[1..], displacement, history, forces, findings));
 }
 
-/// All force fields of a model, the sums of their blocks, and the order in which nodes gather these.
+/// Force fields of a model, the sums of their blocks, and the order in which nodes gather these sums.
 pub(crate) struct InternalForces<R> {
     fields: Vec<Box<dyn ForceField<R>>>,
     /// First entry of `forces` of each field, one more than there are fields.
     field_offsets: Vec<usize>,
     /// Forces [N] of the blocks of each field, and none for nodes without cells.
     forces: Vec<Quad<R>>,
-    /// What each block of each field found.
+    /// Findings of each block of each field.
     findings: Vec<Vec<Findings<R>>>,
-    /// Where in `forces` the parts of each node are, in the order of fields and blocks.
+    /// Places in `forces` of the parts of each node, in the order of fields and blocks.
     shares: Shares,
     tied: Option<Tied<R>>,
 }
 
 /// Forces on nodes that follow others: found first, and given as parts to those that they follow.
 struct Tied<R> {
-    /// Where in `forces` the parts of each such node are, in the order of the ties.
+    /// Places in `forces` of the parts of each such node, in the order of the ties.
     shares: Shares,
     /// First entry of `given` of each, one more than there are.
     offsets: Vec<u32>,
-    /// How much of each component of the force on it goes to each node that it follows, and stays where it is
-    /// held.
+    /// Weights of each component of the force for the followed nodes; for a held component the force stays on
+    /// the node.
     given: Vec<Vector<R>>,
     /// The first of their places in `forces`.
     first: usize,
@@ -116,8 +116,8 @@ struct Tied<R> {
 }
 
 impl<R: LaneNumber> Tied<R> {
-    /// Of a model whose cells leave their forces at some places before `first`; with the places that the
-    /// followed nodes take over.
+    /// Builds the ties of a model whose cells leave their forces at `places` before `first`. Also returns the
+    /// places that the followed nodes take over.
     fn new(model: &Model, places: &[(u32, u32)], first: usize, none: u32) -> (Self, Vec<(u32, u32)>) {
         let mut number = vec![u32::MAX; model.node_count()];
         let (mut offsets, mut given, mut taken) = (vec![0], Vec::new(), Vec::new());
@@ -191,7 +191,7 @@ impl<R: LaneNumber> InternalForces<R> {
         }
     }
 
-    /// Whether there is work for several threads.
+    /// True if there is work for several threads.
     pub(crate) fn is_shared(&self) -> bool {
         self.findings.iter().map(Vec::len).sum::<usize>() > 1
     }
@@ -221,7 +221,7 @@ impl<R: LaneNumber> InternalForces<R> {
         found
     }
 
-    /// Lends this to find other forces; afterwards the forces on nodes are those of before again.
+    /// Lends the forces to a caller that finds other forces; afterwards the forces on nodes are restored.
     pub(crate) fn lend<T>(&mut self, to: impl FnOnce(&mut Self) -> T) -> T {
         let forces = self.forces.clone();
         let made = to(self);
@@ -249,7 +249,8 @@ impl<R: LaneNumber> InternalForces<R> {
         force[0]
     }
 
-    /// The same of some nodes, with room for as many sums.
+    /// Writes the internal forces [N] on some nodes, as [`at`](Self::at) does for one, with room for as many
+    /// sums.
     #[inline(always)]
     pub(crate) fn at_nodes(&self, nodes: Range<usize>, sums: &mut [Quad<R>], to: &mut [Vector<R>]) {
         let sums = &mut sums[..nodes.len()];

@@ -11,9 +11,9 @@ use crate::lanes::LaneNumber;
 use crate::lanes::{LaneWork, Lanes, Processor};
 use crate::relaxation::Relaxation;
 
-/// What an element knows of its cells that does not change from step to step.
+/// Constants of an element's cells from step to step.
 pub(super) trait Element<R: LaneNumber>: Send + Sync {
-    /// Packs of history for a pack of cells, and of that of their pressures.
+    /// Packs of history for a pack of cells, and for a pack of their pressures.
     fn slots(&self) -> [usize; 2];
 
     /// The coefficients of its relaxation.

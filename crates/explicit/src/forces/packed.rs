@@ -1,4 +1,4 @@
-//! Cells in packs: what all elements need of them, and the steps from displacements to gradients and from
+//! Cells in packs: their constants for all elements, and the steps from displacements to gradients and from
 //! stresses to nodal forces.
 
 use std::ops::Range;
@@ -11,14 +11,14 @@ use super::blocks::{Blocks, MOST_PACKS, Quad};
 use crate::lanes::LaneNumber;
 use crate::lanes::{Lanes, Local, PACK, Pack, Places, load_vector};
 
-/// Where the history of one of several points lies, `each` packs a point, in a history of `all` packs;
-/// nowhere in an empty one.
+/// Range of the history of one of several points, `each` packs a point, in a history of `all` packs; empty in
+/// an empty one.
 #[inline(always)]
 pub(super) fn own_packs(point: usize, each: usize, all: usize) -> Range<usize> {
     (point * each).min(all)..((point + 1) * each).min(all)
 }
 
-/// What all elements need of their cells, in packs.
+/// Constants of packs of cells that all elements need.
 pub(super) struct PackedCells<R, const N: usize> {
     pub(super) count: usize,
     /// Nodes of packs of cells in their block.
@@ -80,8 +80,8 @@ impl<R: LaneNumber, const N: usize> PackedCells<R, N> {
     }
 }
 
-/// Gradients of the shape functions [1/m] of packs of cells, of all nodes but the first (they sum to zero),
-/// and volumes [m³], zero where a pack is filled up.
+/// Gradients of the shape functions [1/m] and volumes [m³] of packs of cells. Gradients are those for all
+/// nodes but the first (they sum to zero). Volumes are zero where a pack is filled up.
 pub(super) struct PackedRest<R, const M: usize> {
     pub(super) gradient: [Vector<Pack<R>>; M],
     pub(super) volume: Pack<R>,
@@ -100,8 +100,8 @@ impl<R: LaneNumber, const M: usize> PackedRest<R, M> {
     }
 }
 
-/// u_a − u_0 of all nodes but the first: keeps the digits of small strains in cells that have moved far.
-/// Beside them what else the nodes carry, summed.
+/// Returns u_a − u_0 of all nodes but the first, which keeps the digits of small strains in cells that have
+/// moved far. Also returns the sum of the fourth numbers of the nodes.
 #[inline(always)]
 pub(super) fn relative<R: LaneNumber, L: Lanes<R>, const N: usize, const M: usize>(
     local: &Local<'_, R, N>,

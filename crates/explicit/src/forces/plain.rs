@@ -20,7 +20,7 @@ use crate::relaxation::Relaxation;
 /// Cells of `N` nodes with one evaluation point; `M` is one less.
 pub(super) type SolidForces<R, const N: usize, const M: usize> = OnePass<R, PlainConstants<R, N, M>>;
 
-/// What does not change from step to step.
+/// Constants of the elements from step to step.
 pub(super) struct PlainConstants<R, const N: usize, const M: usize> {
     law: AnyLaw,
     cells: PackedCells<R, N>,
@@ -28,7 +28,7 @@ pub(super) struct PlainConstants<R, const N: usize, const M: usize> {
     hourglass: Option<Vec<PackedHourglass<R>>>,
     /// The shear modulus at rest [Pa], where the stiffness against hourglass patterns grows from it.
     growth: Option<f64>,
-    /// Of hexahedra.
+    /// Corners of hexahedra.
     corners: Vec<PackedCorners<R>>,
     relaxation: Relaxation<R>,
     /// Packs of history for a pack of cells.
@@ -67,8 +67,9 @@ struct AtWork<R> {
 }
 
 impl<R: LaneNumber, const N: usize, const M: usize> PlainConstants<R, N, M> {
-    /// Finds the displacement gradients of a pack, by its number in all and in the block, and its resistance
-    /// to hourglass patterns; adds the energy of these where their stiffness does not grow.
+    /// Finds the displacement gradients of a pack, and its resistance to hourglass patterns. The pack is
+    /// numbered among all packs and in the block. Adds the energy of the patterns if their stiffness does not
+    /// grow.
     #[inline(always)]
     fn deform<L: Lanes<R>>(
         &self,

@@ -33,7 +33,8 @@ pub(crate) fn distorted_cube(element: &str, law: AnyLaw) -> Model {
     filled_cube(element, law, 700.0, 1000.0, |_| 1.0)
 }
 
-/// The same with a shear modulus for the hourglass control, a density, and a fraction for each cell.
+/// Builds a cube like [`distorted_cube`], with a shear modulus for the hourglass control, a density, and a
+/// fraction for each cell.
 fn filled_cube(
     element: &str,
     law: AnyLaw,
@@ -232,7 +233,7 @@ pub(crate) fn every_element() -> impl Iterator<Item = Model> {
     laws().into_iter().flat_map(|law| ELEMENTS.map(|element| distorted_cube(element, law)))
 }
 
-/// Each also with cells of which the body fills a part.
+/// Builds models of every element, each also with cells of which the body fills a part.
 fn every_element_full_or_not() -> impl Iterator<Item = Model> {
     let mut random = Random::new(19);
     let filled = laws().into_iter().flat_map(|law| ELEMENTS.map(|element| (element, law)));
@@ -278,8 +279,8 @@ fn patch_test_on_distorted_cells() {
     }
 }
 
-/// A flat sheet of crooked triangles, turned in space: a homogeneous deformation leaves inner nodes in
-/// balance, and the force on an edge is that of the stress.
+/// A flat sheet of crooked triangles, turned in space. A homogeneous deformation leaves inner nodes in
+/// balance, and the force on an edge follows from the stress.
 #[test]
 fn a_membrane_passes_the_patch_test() {
     let mut random = Random::new(47);
@@ -322,8 +323,8 @@ fn a_membrane_passes_the_patch_test() {
     }
 }
 
-/// A bar by itself: its natural frequency, that of two masses on a spring of E A/L₀, slack or not, and the
-/// length of the first step.
+/// A single bar, slack or not, has the critical time step of two masses on a spring of E A/L₀. Its force at
+/// the start follows from the slack.
 #[test]
 fn a_bar_vibrates_as_two_masses_on_a_spring() {
     for slack in [1.0, 0.8, 1.3] {
@@ -410,8 +411,8 @@ fn force_is_the_derivative_of_energy() {
     }
 }
 
-/// A free cube of tissue that stiffens, thrown into itself: over 4,000 steps a third of the energy goes
-/// through hourglass modes and back, and none is made.
+/// A free cube of tissue that stiffens, thrown into itself. Over 4,000 steps a third of the energy passes
+/// through hourglass modes and back, and no energy is made.
 #[test]
 fn a_growing_hourglass_stiffness_conserves_energy() {
     let law = law("demiray", json!({ "shear-modulus": 700.0, "bulk-modulus": 5e3, "exponent": 8.0 }));
@@ -435,8 +436,8 @@ fn a_growing_hourglass_stiffness_conserves_energy() {
     assert!(most / least - 1.0 < 0.02, "{least} to {most}");
 }
 
-/// Of the written energy density; with the J of the cell instead of the averaged one it was up to 1.88 times
-/// too large.
+/// Checks the written energy density; with the J of the cell instead of the averaged one it was up to 1.88
+/// times too large.
 #[test]
 fn energy_densities_sum_to_the_energy_that_the_forces_come_from() {
     let mut random = Random::new(29);
@@ -453,8 +454,7 @@ fn energy_densities_sum_to_the_energy_that_the_forces_come_from() {
             continue;
         }
         let own: Vec<_> = (0..solid.cells.len()).map(|cell| recovery.cell(0, cell)).collect();
-        // Averages and cells change the same volume in all, and pressure is that of J where it is averaged
-        // once.
+        // Averages and cells change the same volume in all.
         let volume = |of: fn(&CellFields) -> f64| -> f64 {
             own.iter().enumerate().map(|(cell, fields)| solid.cells.volume(cell) * of(fields)).sum()
         };
@@ -463,8 +463,8 @@ fn energy_densities_sum_to_the_energy_that_the_forces_come_from() {
     }
 }
 
-/// Fields of all cells, a pack at a time, are those of single cells to the bit, and their stress is that of
-/// the law and of what it remembers.
+/// Fields of all cells, a pack at a time, equal the fields of single cells to the bit. Their stress follows
+/// from the law and its history.
 #[test]
 fn cells_in_lanes_are_recovered_as_one_by_one() {
     let mut random = Random::new(37);
@@ -560,7 +560,7 @@ fn cells_filled_by_half_are_cells_of_half_the_modulus_and_half_the_density() {
             let half = filled_cube(element, law, 700.0, 1000.0, |_| 0.5);
             let light = filled_cube(element, soft, 350.0, 500.0, |_| 1.0);
             let displacement: Vec<_> = half.rest.iter().map(|_| vector(&mut random, 0.01)).collect();
-            // A factor of a power of two commutes with every rounding but those of an averaged pressure.
+            // A factor of a power of two commutes with every rounding except in an averaged pressure.
             let of = |model| forces(model, &displacement);
             assert!(apart(&of(&light).0, &of(&half).0) < 1e-14, "{element}");
             assert!((of(&light).1 - of(&half).1).abs() <= 1e-14 * of(&light).1, "{element}");
@@ -627,14 +627,14 @@ fn apart(a: &[Vector<f64>], b: &[Vector<f64>]) -> f64 {
     largest(a.iter().zip(b).map(|(&a, &b)| sub(a, b))) / largest(a.iter().copied())
 }
 
-/// A growing hourglass stiffness takes differences of stresses, over the cube root of round-off in F: of the
-/// small part that they make of a force a third of the digits is lost.
+/// Factor on the tolerance of a growing hourglass stiffness. Its differences of stresses, over the cube root
+/// of round-off in F, lose a third of the digits of their small part in a force.
 fn lost_digits(model: &Model) -> f64 {
     if model.solids[0].hourglass_growth().is_some() { 10.0 } else { 1.0 }
 }
 
-/// Of every law and element, without and with history: 162 tets or 27 hexes, so that the last pack is not
-/// full.
+/// Builds models of every law and element, without and with history: 162 tets or 27 hexes, so that the last
+/// pack is not full.
 fn every_kernel() -> impl Iterator<Item = Model> {
     let elements = ["tet4", "tet4-anp", "tet4-ianp", "hex8", "growing-hex8", "hex8-full", "membrane"];
     let models = every_law().into_iter().flat_map(move |law| elements.map(|e| (e, law)));
@@ -706,8 +706,8 @@ fn packs_of_tets_are_their_cells_one_by_one() {
     }
 }
 
-/// The corners of flat hexahedra are judged exactly, however the estimate that spares the look at them comes
-/// out, in both precisions and in all lanes.
+/// The corners of flat hexahedra are judged exactly, whatever the estimate that avoids the check gives, in
+/// both precisions and in all lanes.
 #[test]
 fn a_corner_turned_inside_out_is_found_and_no_other() {
     let mut random = Random::new(41);

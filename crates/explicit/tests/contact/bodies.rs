@@ -51,7 +51,7 @@ fn momenta(model: &Model, state: &State<f64>, step: f64) -> [Vector3<f64>; 2] {
     all
 }
 
-/// One step; the force [N] of the first contact on the second body, and the state's energy [J].
+/// Takes one step. Returns the force [N] of the first contact on the second body, and the state's energy [J].
 fn step(stepper: &mut CentralDifference<f64>, state: &mut State<f64>) -> ([f64; 3], f64) {
     stepper.evaluate(state).unwrap();
     let (force, energies) = (stepper.contact_forces()[0], *stepper.energies());
@@ -59,8 +59,8 @@ fn step(stepper: &mut CentralDifference<f64>, state: &mut State<f64>) -> ([f64; 
     (force, energies.kinetic + energies.internal)
 }
 
-/// Two equal bars: the wave of the impact goes to the far ends and back, then the first is at rest, and the
-/// second flies with its speed (Saint-Venant). They touch for 2 L/c.
+/// Two equal bars meet. The wave of the impact goes to the far ends and back. Then the first bar is at rest,
+/// and the second flies with its speed (Saint-Venant). They touch for 2 L/c.
 #[test]
 fn two_bars_that_meet_exchange_their_velocities() {
     let (shear, density, speed, length) = (5e4, 1000.0, 0.02, 0.4);
@@ -131,8 +131,8 @@ fn tumbling() -> Model {
     model
 }
 
-/// Lists made anew in every third step, with a ball beside the bodies too, give the same bits as lists that
-/// are held as long as they can be.
+/// Lists made anew in every third step give the same bits as lists that are held as long as they can be. This
+/// holds with a ball beside the bodies, too.
 #[test]
 fn results_do_not_depend_on_when_lists_are_made() {
     let model = Arc::new(tumbling());
@@ -240,7 +240,7 @@ fn a_uniform_pressure_goes_through_cells_that_do_not_match() {
     while state.time < 1.0 {
         (force, _) = step(&mut stepper, &mut state);
     }
-    // Without volumetric coupling the strain is that of a column: its nodes move by z times the strain.
+    // Without volumetric coupling the strain is the strain of a column: its nodes move by z times the strain.
     let strain = pressure / (2.0 * shear);
     let worst = (0..model.node_count())
         .map(|node| (state.displacement[node][2] + strain * model.rest[node][2]).abs() / (strain * 0.06))
@@ -321,7 +321,7 @@ fn a_body_touches_itself() {
 }
 
 /// Bodies, and the arms of a body, that begin nearer than the distance that they keep stay where they are:
-/// nothing pushes them. Bodies that begin farther away keep the whole of it.
+/// nothing pushes them. Bodies that begin farther away keep the whole distance.
 #[test]
 fn what_begins_nearer_than_the_distance_to_keep_is_not_pushed() {
     for (gap, nearer) in [(0.0, true), (2e-4, true), (2e-3, false)] {

@@ -1,6 +1,6 @@
-//! Bodies that meet at corners and edges (primitive scenes of rigid-body libraries, and the degenerate ones
-//! of Erleben 2018): they end, with finite numbers, in bounds, and no edge of one is ever in a triangle of
-//! another; all of them soft, or rigid what is held.
+//! Bodies that meet at corners and edges: primitive scenes of rigid-body libraries, and the degenerate ones
+//! of Erleben 2018. The runs end, with finite numbers, in bounds, and no edge of one body is ever in a
+//! triangle of another. All bodies are soft, or the held ones are rigid.
 
 use std::sync::Arc;
 
@@ -60,7 +60,7 @@ fn rigid(piece: &Piece) -> Rigid {
     Rigid { shape, trajectory: Trajectory::fixed(at), ..floor() }
 }
 
-/// How many edges of one surface go through a triangle of another.
+/// Counts the edges of one surface that go through a triangle of another.
 fn intersections(surfaces: &[Surface], place: &impl Fn(u32) -> Vector3<f64>) -> usize {
     let mut count = 0;
     for (a, first) in surfaces.iter().enumerate() {
@@ -77,7 +77,7 @@ fn intersections(surfaces: &[Surface], place: &impl Fn(u32) -> Vector3<f64>) -> 
     count
 }
 
-/// Whether a segment goes through a triangle, by signed volumes.
+/// True if a segment goes through a triangle, by signed volumes.
 fn crosses(from: Vector3<f64>, to: Vector3<f64>, [a, b, c]: [Vector3<f64>; 3]) -> bool {
     let volume = |p: Vector3<f64>, q: Vector3<f64>, r: Vector3<f64>, s: Vector3<f64>| {
         (q - p).cross(&(r - p)).dot(&(s - p))
@@ -89,7 +89,7 @@ fn crosses(from: Vector3<f64>, to: Vector3<f64>, [a, b, c]: [Vector3<f64>; 3]) -
     sides.iter().all(|side| *side > 0.0) || sides.iter().all(|side| *side < 0.0)
 }
 
-/// Plays a scene, with all bodies soft or with rigid ones that are held; what is wrong with it.
+/// Plays a scene, with all bodies soft or with rigid ones that are held. Returns an error if the scene fails.
 fn play(scene: &Scene, is_rigid: bool) -> Result<(), String> {
     let name = if is_rigid { format!("{}, rigid", scene.name) } else { scene.name.to_owned() };
     let [shear, part] = manner(scene, is_rigid);

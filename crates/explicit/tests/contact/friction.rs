@@ -16,8 +16,8 @@ use pliant_mechanics::prony::Prony;
 use super::rigid::{at, floor};
 use super::{add_block, block, stepper};
 
-/// A block that is pressed onto a floor, and drawn over it at 10 mm/s by its top, or rests while the floor is
-/// drawn away beneath it: the floor feels μ N along the slip in any direction (A5).
+/// A block is pressed onto a floor. It is drawn over the floor at 10 mm/s by its top, or rests while the
+/// floor is drawn away beneath it. The floor feels μ N along the slip in any direction (A5).
 #[test]
 fn friction_of_a_dragged_block_is_mu_times_the_load_along_the_slip() {
     let (speed, friction) = (0.01, 0.3);
@@ -67,9 +67,10 @@ fn friction_of_a_dragged_block_is_mu_times_the_load_along_the_slip() {
     assert!(off < 0.01 && askew < 1.0, "{off:.1e} {askew:.1e}");
 }
 
-/// A stiff block, 1 MPa, is put on a plane of slope ½, gravity at once. What trembles in it would slide at
-/// friction 0.51 and too fast at 0.49; damping by stiffness of as much as the critical time step calms it. It
-/// sticks, or slides by 43.87 mm/s² t² but for what it gains in the first tremble.
+/// A stiff block, 1 MPa, is put on a plane of slope ½, gravity at once. Trembling would let the block slide
+/// at friction 0.51, and too fast at 0.49. Damping by stiffness of as much as the critical time step calms
+/// the block. The block sticks, or slides by 43.87 mm/s² t², except for the way it gains in the first
+/// tremble.
 #[test]
 fn a_stiff_block_on_an_incline_sticks_or_slides_with_damping_by_stiffness() {
     let slid = |friction: f64, damping: f64, mass_damping: f64| {

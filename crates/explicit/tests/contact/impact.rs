@@ -11,8 +11,8 @@ use pliant_testing::ball_of_hexes;
 use super::rigid::{at, floor};
 use super::{leapfrog_energy, stepper};
 
-/// A ball of 20 mm that flies against a floor without gravity, friction and damping: its energy never grows,
-/// its momentum changes by the impulse of the floor, and it flies back no faster than it came (A6).
+/// A ball of 20 mm flies against a floor without gravity, friction and damping. Its energy never grows, its
+/// momentum changes by the impulse of the floor, and it flies back no faster than it came (A6).
 #[test]
 fn a_dropped_ball_never_gains_energy() {
     for (speed, duration) in [(0.05, 0.12), (0.2, 0.1)] {

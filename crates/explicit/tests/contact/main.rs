@@ -18,7 +18,7 @@ use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
 use pliant_mechanics::model::{Cells, Material, Model, Solid};
 use pliant_mechanics::prony::Prony;
 
-/// A block of so many cubes along each axis, its lowest corner at the origin; without volumetric coupling.
+/// A block of `cells` cubes along each axis, its lowest corner at the origin; without volumetric coupling.
 pub fn block(cells: [u32; 3], edge: f64, shear: f64, prony: Prony) -> Model {
     let mut model = Model::default();
     let law = AnyLaw::NeoHookean(NeoHookean { shear, volumetric: Volumetric::quadratic(2.0 * shear / 3.0) });
@@ -80,8 +80,8 @@ fn stepper(model: &Arc<Model>, contacts: &Arc<Contacts>, part: f64) -> CentralDi
     CentralDifference::new(Arc::clone(model), step).unwrap().with_contacts(Arc::clone(contacts))
 }
 
-/// One step; the energy [J] before it that central differences keep: ½ Σ m v⁻·v⁺ of the velocities before and
-/// after the instant, and what is stored there.
+/// Takes one step. Returns the energy [J] before it that central differences keep. It is ½ Σ m v⁻·v⁺ of the
+/// velocities before and after the instant, and the energy stored there.
 pub fn leapfrog_energy(model: &Model, stepper: &mut CentralDifference<f64>, state: &mut State<f64>) -> f64 {
     stepper.evaluate(state).unwrap();
     let before = state.increment.clone();

@@ -1,4 +1,4 @@
-//! What contacts do to single nodes: forces, pressures, gaps and ways of sliding.
+//! Results of contacts at single nodes: forces, pressures, gaps and slips.
 
 use std::sync::Arc;
 
@@ -58,7 +58,7 @@ fn settled(cells: [u32; 3], until: f64) -> (Arc<Model>, Arc<Contacts>, CentralDi
     (model, contacts, stepper, state)
 }
 
-/// While a block bounces on its floor, forces of nodes sum to that of the contact, and pressures times shares
+/// While a block bounces on its floor, forces of nodes sum to the contact force, and pressures times shares
 /// to its normal part.
 #[test]
 fn forces_and_pressures_of_nodes_sum_to_the_force_of_the_contact() {
@@ -106,8 +106,8 @@ fn a_block_presses_on_its_floor_by_its_height() {
     assert!(corners.iter().all(|ratio| (ratio - 1.0).abs() < 0.01), "{corners:?}");
 }
 
-/// The gap is the distance from a ball, less what is kept, wherever the ball is on its way; where nothing is
-/// near there is no force.
+/// The gap is the distance from a ball, less the distance to keep, wherever the ball is on its way. Where
+/// nothing is near there is no force.
 #[test]
 fn gaps_are_distances_from_tools() {
     let model = block([2, 2, 2], 0.01, 3e3, Prony::default());
@@ -139,8 +139,8 @@ fn gaps_are_distances_from_tools() {
     }
 }
 
-/// On an incline of the slope ½ the slip of each lower node is the way that it goes, and with μ > ½ there is
-/// none. Once the floor sinks away, nothing touches any more.
+/// On an incline of the slope ½ the slip of each lower node is its way along the incline. With μ > ½ the slip
+/// is zero. Once the floor sinks away, nothing touches any more.
 #[test]
 fn slip_on_an_incline_is_the_way_that_nodes_go() {
     let (sine, cosine) = (0.2_f64.sqrt(), 0.8_f64.sqrt());

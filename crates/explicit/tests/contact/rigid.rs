@@ -87,8 +87,8 @@ fn height(state: &State<f64>, model: &Model) -> f64 {
     state.displacement.iter().zip(&model.rest).map(|(u, x)| u[2] + x[2]).fold(f64::INFINITY, f64::min)
 }
 
-/// A bar flies against a wall: no node goes through it, the energy never grows beyond the start, the bar
-/// flies back, and the step stays that of the free bar up to 0.99 of the critical one (A7).
+/// A bar flies against a wall and back. No node goes through the wall, and the energy never grows beyond the
+/// start. The step stays as for the free bar up to 0.99 of the critical one (A7).
 #[test]
 fn a_bar_bounces_off_a_wall_at_the_step_of_the_free_bar() {
     for part in [0.5, 0.9, 0.99] {
@@ -121,8 +121,8 @@ fn a_bar_bounces_off_a_wall_at_the_step_of_the_free_bar() {
     }
 }
 
-/// A capsule that is driven into a block, or grows into it, stays free of all nodes, and of points between to
-/// a twentieth of its radius; the work that drives it is the energy of the block.
+/// A capsule is driven into a block, or grows into it. It stays free of all nodes, and of points between them
+/// to a twentieth of its radius. The work that drives it is the energy of the block.
 #[test]
 fn a_tool_presses_no_node_into_itself() {
     for (fast, growth) in [(1.0, 0.0), (10.0, 0.0), (10.0, 0.004), (1.0, 0.002)] {

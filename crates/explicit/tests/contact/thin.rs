@@ -12,7 +12,7 @@ use pliant_mechanics::prony::Prony;
 use super::rigid::at;
 use super::{block, stepper};
 
-/// A block flies against sheets of 1 mm to 10 µm, by up to 60 of their thicknesses in a step: all of it stays
+/// A block flies against sheets of 1 mm to 10 µm, by up to 60 of their thicknesses in a step. All of it stays
 /// on its side (S5).
 #[test]
 fn a_fast_body_does_not_pass_through_a_thin_sheet() {
@@ -44,8 +44,8 @@ fn a_fast_body_does_not_pass_through_a_thin_sheet() {
     }
 }
 
-/// A ball of 1 mm that shoots through a block by up to 200 mm in a step takes the node in its way along: that
-/// is never behind it.
+/// A ball of 1 mm shoots through a block by up to 200 mm in a step. It takes the node in its way along: the
+/// node is never behind it.
 #[test]
 fn a_fast_thin_tool_passes_over_no_node() {
     let model = Arc::new(block([2, 2, 1], 0.01, 2e3, Prony::default()));

@@ -1,12 +1,12 @@
-//! The forms that a JSON schema gives a value, with references and alternatives resolved, and what they are
-//! in words.
+//! The forms of a value in a JSON schema, with references and alternatives resolved, and their names in
+//! words.
 
 use serde_json::{Map, Value as Json};
 
 use super::words::{alternatives, number};
 use crate::source::Value;
 
-/// Schemas refer to one another; deeper than this they refer to themselves.
+/// Largest depth of references between schemas; deeper schemas refer to themselves.
 const DEEPEST_REFERENCE: usize = 32;
 
 /// The kinds of JSON values.
@@ -55,7 +55,7 @@ pub(crate) struct Form<'s> {
     pub(crate) words: Option<Vec<&'s str>>,
     pub(crate) properties: Vec<(&'s str, &'s Json)>,
     pub(crate) required: Vec<&'s str>,
-    /// What a table takes beside its properties.
+    /// Schema of the further keys of a table.
     pub(crate) additional: Option<&'s Json>,
     pub(crate) items: Option<&'s Json>,
     pub(crate) prefix: Vec<&'s Json>,
@@ -70,7 +70,7 @@ pub(crate) struct Form<'s> {
 }
 
 impl<'s> Form<'s> {
-    /// Takes in what a schema says itself, beside its references and alternatives.
+    /// Adds a schema's own properties, without its references and alternatives.
     fn absorb(&mut self, schema: &'s Map<String, Json>) {
         self.doc = schema.get("description").and_then(Json::as_str).or(self.doc);
         let types = match schema.get("type") {
@@ -158,7 +158,7 @@ impl<'s> Form<'s> {
         self.properties.iter().find(|(name, _)| *name == key).map(|(_, schema)| *schema)
     }
 
-    /// Whether the value is of this form's kind.
+    /// True if the value is of this form's kind.
     pub(super) fn fits(&self, value: &Value) -> bool {
         match self.kind {
             None => true,
@@ -177,7 +177,7 @@ impl<'s> Form<'s> {
         self.property(key)?.get("const")?.as_str()
     }
 
-    /// The range of a number in words, "greater than 0 and at most 0.5"; empty where there is none.
+    /// The range of a number in words, "greater than 0 and at most 0.5"; empty without a range.
     pub(crate) fn range(&self) -> String {
         let of_type = |bound: &Bound| {
             [f32::MAX as f64, u32::MAX as f64, i32::MAX as f64, -(i32::MIN as f64)]
@@ -206,7 +206,7 @@ pub(crate) struct Forms<'s> {
 }
 
 impl<'s> Forms<'s> {
-    /// The forms that a value of this schema may take; "no value", which TOML cannot say, is none of them.
+    /// The forms that a value of this schema may take; "no value", which TOML cannot say, is left out.
     pub(crate) fn of(self, schema: &'s Json) -> Vec<Form<'s>> {
         let mut forms = Vec::new();
         for form in self.resolve(schema, Form::default(), 0) {
@@ -251,7 +251,7 @@ impl<'s> Forms<'s> {
         self.root.pointer(schema.get("$ref")?.as_str()?.strip_prefix('#')?)
     }
 
-    /// The first paragraph of a schema's description, or of what it refers to.
+    /// The first paragraph of a schema's description, or of the schema to which it refers.
     pub(crate) fn doc(self, schema: &'s Json) -> Option<&'s str> {
         let own = |schema: &'s Json| schema.get("description")?.as_str()?.split("\n\n").next();
         own(schema).or_else(|| {
@@ -356,7 +356,8 @@ impl<'s> Forms<'s> {
     }
 }
 
-/// The unit in a doc comment: the last brackets of its first paragraph that hold one, "Shear modulus [Pa]."
+/// The unit in a doc comment: in the last brackets of its first paragraph that hold a unit, "Shear modulus
+/// [Pa]."
 pub(crate) fn unit(doc: Option<&str>) -> &str {
     let doc = doc.unwrap_or_default();
     let in_brackets = |open: usize| {

@@ -2,9 +2,9 @@
 //! place.
 //!
 //! The schema is the one that schemars derives from the parameter struct: meaning, unit, range and default
-//! are declared there once. Whatever keys a table's schema does not name are mistakes, whether or not the
-//! struct denies unknown fields, because serde cannot deny them in structs with flattened parts. Names that
-//! only serde knows (`alias`) and the schema's `pattern`, `multipleOf` and `uniqueItems` are ignored.
+//! are declared there once. A key that a table's schema does not name is a mistake, even if the struct allows
+//! unknown fields. Serde cannot deny them in structs with flattened parts. Names that only serde knows
+//! (`alias`) and the schema's `pattern`, `multipleOf` and `uniqueItems` are ignored.
 
 mod form;
 #[cfg(test)]
@@ -31,17 +31,17 @@ use crate::source::{Node, Source, Value};
 /// Checks a value of the user against a schema. `path` is the value's name in messages, such as
 /// `law.parenchyma`; `schema` is a root schema, with its definitions in `$defs`.
 ///
-/// Every mistake goes to `out`. The answer is what the user wrote as JSON, to be deserialised where there was
-/// no mistake; parts with mistakes are missing from it.
+/// Every mistake goes to `out`. Returns the user's value as JSON, without the parts that have mistakes.
+/// Deserialise the value only if there was no mistake.
 pub fn check(node: &Node, path: &str, schema: &Schema, out: &mut Vec<Diagnostic>) -> Json {
     check_skipping(node, path, schema, &[], out)
 }
 
-/// Reads the table at `path` into its parameter struct; `None` where there was a mistake, which is then in
+/// Reads the table at `path` into its parameter struct; returns `None` after a mistake, which it adds to
 /// `out`.
 ///
 /// Keys in `skip` are left to the caller, such as the `type` that chose the struct. A table that the file
-/// lacks is read as an empty one: the defaults, or what is required and missing.
+/// lacks is read as an empty one: optional keys get their defaults, required keys are reported as missing.
 pub(crate) fn read_table<T: DeserializeOwned + JsonSchema>(
     source: &Source,
     path: &[&str],
@@ -80,7 +80,7 @@ pub(crate) fn check_skipping(
     checker.value(node, &forms, &Trail::Start(path), checker.forms.doc(root)).unwrap_or(Json::Null)
 }
 
-/// The way from the first value to the one that is being checked.
+/// Path from the first value to the value that is being checked.
 enum Trail<'t> {
     Start(&'t str),
     Key(&'t Trail<'t>, &'t str),
@@ -99,7 +99,7 @@ impl fmt::Display for Trail<'_> {
 }
 
 impl Trail<'_> {
-    /// What messages begin with: "`law.parenchyma`: ".
+    /// Beginning of messages: "`law.parenchyma`: ".
     fn subject(&self) -> String {
         match self {
             Trail::Start("") => String::new(),
@@ -115,7 +115,7 @@ impl Trail<'_> {
         }
     }
 
-    /// The parameter whose doc comment explains a value: the last key of the way.
+    /// The parameter whose doc comment explains a value: the last key of the path.
     fn parameter(&self) -> &str {
         match self {
             Trail::Start(path) => path.rsplit('.').next().unwrap_or(path),
@@ -260,7 +260,7 @@ impl<'s> Checker<'s, '_> {
         self.report(diagnostic.help(hint).help(trail.explained(doc)))
     }
 
-    /// Whether a value in its range has a plausible size; reports one that is impossible or unlikely.
+    /// True if the size of a value is possible; reports impossible and unlikely sizes.
     fn is_possible(
         &mut self,
         node: &Node,
@@ -269,7 +269,7 @@ impl<'s> Checker<'s, '_> {
         trail: &Trail<'_>,
         doc: Option<&'s str>,
     ) -> bool {
-        // Positions are as large as they like.
+        // Positions may have any size.
         let unit = unit(doc);
         if unit == "m" && !positive {
             return true;
@@ -296,7 +296,7 @@ impl<'s> Checker<'s, '_> {
             let positive = form.lower.is_some_and(|bound| bound.exclusive && bound.value == 0.0);
             return self.is_possible(node, x, positive, trail, doc);
         };
-        // Limits of 32-bit types are shown only to those who break them.
+        // Limits of 32-bit types are shown only if a value breaks them.
         let range = if range.contains(&broken) { range } else { broken };
         let message = match trail {
             Trail::Start("") => format!("the value must be {range}, found {}", number(x)),
@@ -394,7 +394,7 @@ impl<'s> Checker<'s, '_> {
                 values
             });
         }
-        // Of items that are all wrong and too few as well, the length is not the news.
+        // A wrong length is reported only if no item is wrong.
         if wrong_length && self.out.len() == before {
             let expected = self.forms.phrase(std::slice::from_ref(form), unit(doc));
             let message = format!("{}expected {expected}, found {count}", trail.subject());
@@ -462,7 +462,7 @@ impl<'s> Checker<'s, '_> {
         self.report(Diagnostic::error(message).at(given.place.clone(), "not known here").help(hint))
     }
 
-    /// `own` are the keys of each form that not all forms have, here at most one each.
+    /// `own` has the keys of each form that not all forms have, at most one for each form.
     fn keyed(
         &mut self,
         node: &Node,
@@ -569,7 +569,7 @@ impl<'s> Checker<'s, '_> {
         Some(Json::Object(table))
     }
 
-    /// Reports it and returns the key that was probably meant.
+    /// Reports an unknown key and returns the key that was probably meant.
     fn unknown_key(
         &mut self,
         key: &str,
@@ -579,7 +579,7 @@ impl<'s> Checker<'s, '_> {
         others: &[&'s str],
         trail: &Trail<'_>,
     ) -> Option<&'s str> {
-        // What the file gives already can still be meant by an option that replaces it.
+        // An option may mean a key that the file already gives, since it replaces the key.
         let replaces = matches!(child.place, Place::Option(..));
         let free = |name: &&str| replaces || !entries.iter().any(|(given, _)| given == name);
         let known: Vec<&'s str> =

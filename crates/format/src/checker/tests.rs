@@ -31,7 +31,7 @@ fn poisson() -> f64 {
     0.45
 }
 
-/// The same everywhere or a field of the mesh.
+/// One direction everywhere, or a field of the mesh.
 #[derive(Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(untagged)]
 enum Fibre {
@@ -105,7 +105,7 @@ enum Curve {
     Sine { period: f64 },
 }
 
-/// When.
+/// Interval of time.
 #[derive(Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 struct Timing {
@@ -145,7 +145,7 @@ struct Move {
     anything: Option<Json>,
 }
 
-/// What was read of table `t`, and each mistake as its message, what it underlines, and its help.
+/// Reads table `t`; returns its value, and each mistake as its message, the underlined text and its help.
 fn read<T: DeserializeOwned + JsonSchema>(text: &str) -> (Option<T>, Vec<[String; 3]>) {
     let source = Source::parse("scene.toml", text).unwrap_or_else(|errors| panic!("{}", errors.plain()));
     let mut out = Vec::new();

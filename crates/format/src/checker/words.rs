@@ -1,8 +1,8 @@
-//! What the user wrote, and lists of it, in words.
+//! Values and lists of the user in words.
 
 use crate::source::{Node, Value};
 
-/// What the user wrote, in words.
+/// Returns a value of the user in words.
 pub(super) fn found(node: &Node) -> String {
     let short = |text: &str| match text.char_indices().nth(40) {
         Some((end, _)) => format!("{}…", &text[..end]),

@@ -1,4 +1,4 @@
-//! Scenes to start from: the one that `pliant new` writes, small, commented, runs as it is; of a mesh; of an
+//! Scenes to start from: the small, commented scene of `pliant new`, a scene of a mesh, and a scene of an
 //! organ with vessels and capsule.
 
 mod of_mesh;
@@ -9,7 +9,7 @@ pub use organ_scene::OrganScene;
 
 /// The text of a starter scene with a title.
 pub fn starter(name: &str) -> String {
-    // A TOML string: what a folder can be called may hold quotes.
+    // A TOML string: the name of a folder may hold quotes.
     let title = serde_json::Value::from(name).to_string();
     include_str!("starter.toml").replace("\"TITLE\"", &title)
 }

@@ -1,4 +1,4 @@
-//! The scene that a mesh alone is: soft tissue that is held at one end, to be looked at and pulled.
+//! The scene of a mesh alone: soft tissue that is held at one end, to be viewed and pulled.
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ use pliant_geometry::{Labels, Mesh};
 
 /// A body whose longest side is longer than this [m] is taken to be in millimetres.
 const LARGEST: f64 = 2.0;
-/// Cells along the longest side of what a surface encloses.
+/// Cells along the longest side of the volume inside a surface.
 const CELLS: f64 = 12.0;
 /// Young's modulus [Pa], Poisson's ratio and density [kg/m³].
 const TISSUE: [f64; 3] = [5e3, 0.45, 1000.0];
@@ -20,18 +20,18 @@ pub struct SceneOfMesh {
     pub text: String,
     /// The folder of the mesh.
     pub folder: PathBuf,
-    /// What was assumed, in a sentence.
+    /// Assumptions in a sentence.
     pub assumed: String,
 }
 
-/// Whether a path has the ending of a mesh file.
+/// True if a path has the ending of a mesh file.
 pub fn is_mesh(path: &Path) -> bool {
     Format::of_path(path).is_some()
 }
 
-/// Makes a scene of a mesh file: soft tissue, held where its lowest tenth along its longest side is. What a
-/// surface encloses is filled with tets; the elements of a volume mesh with labels have their colours.
-/// Damping is half of the critical one of the slowest vibration along that side.
+/// Makes a scene of a mesh file: soft tissue, held where its lowest tenth along its longest side is. The
+/// volume inside a surface is filled with tets; labelled elements of a volume mesh are coloured by their
+/// labels. Damping is half of the critical damping of the slowest vibration along that side.
 ///
 /// # Errors
 /// If the file can't be read.
@@ -41,7 +41,7 @@ pub fn scene_of_mesh(path: &Path) -> Result<SceneOfMesh, MeshFileError> {
     Ok(SceneOfMesh { folder, ..scene_of(&io::read(path)?.mesh, "file", &name) })
 }
 
-/// The same of a mesh in metres that a program [gives](crate::source::Source::giving) by a name.
+/// Writes the scene of a mesh in metres that a program [gives](crate::source::Source::giving) by a name.
 pub fn scene_of_given(mesh: &Mesh, name: &str) -> SceneOfMesh {
     scene_of(mesh, "given", name)
 }
@@ -105,13 +105,13 @@ nodes = {{ half-space = {{ point = {point:?}, normal = {normal:?} }} }}
     SceneOfMesh { text, folder: PathBuf::new(), assumed }
 }
 
-/// Damping [1/s] of a body of a length [m]: half of the critical one of its slowest vibration along it, α = 2
-/// · ½ · (π/2) √(E/ρ)/L.
+/// Damping [1/s] of a body of a length [m], α = 2 · ½ · (π/2) √(E/ρ)/L. It is half of the critical damping of
+/// the slowest vibration along this length.
 pub(super) fn calming(young: f64, density: f64, length: f64) -> f64 {
     0.5 * std::f64::consts::PI * (young / density).sqrt() / length.max(1e-6)
 }
 
-/// To two digits.
+/// Rounds to two digits.
 fn rounded(value: f64) -> f64 {
     format!("{value:.1e}").parse().unwrap_or(value)
 }

@@ -1,5 +1,5 @@
-//! The scene of a segmented organ: its tissue as tets, vessels of other labels as membranes tied to the
-//! tissue, and a capsule on its boundary.
+//! Writes the scene of a segmented organ. Its tissue is meshed with tets, vessels of other labels are
+//! membranes tied to the tissue, and a capsule covers its boundary.
 
 use pliant_geometry::Vector3;
 
@@ -15,24 +15,25 @@ const DENSITY: f64 = 1060.0;
 /// A segmented organ with its walls.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OrganScene {
-    /// What the scene is called.
+    /// Title of the scene.
     pub title: String,
-    /// Where the tissue comes from, as in the `mesh` of a body:
-    /// `image = "seg.nii.gz", labels = [5], vessels = [6]`, with names and cleaning.
+    /// Source of the tissue, as in the `mesh` of a body: `image = "seg.nii.gz", labels = [5], vessels = [6]`,
+    /// with names and cleaning.
     pub source: String,
     /// Edge of the tets [m].
     pub edge: f64,
-    /// Where each vessel comes from, `image = "seg.nii.gz", label = 6`, with its thickness [m].
+    /// Source of each vessel, `image = "seg.nii.gz", label = 6`, with its thickness [m].
     pub vessels: Vec<(String, f64)>,
     /// Thickness of the capsule [m].
     pub capsule: Option<f64>,
-    /// Corners of the box round the bulk of the tissue [m].
+    /// Corners of the box around the bulk of the tissue [m].
     pub bounds: [Vector3; 2],
 }
 
 impl OrganScene {
-    /// Its text, commented. The organ is held at its lowest tenth along its longest side and pulled at the
-    /// other end. Damping is half of the critical one of the slowest vibration along that side.
+    /// Text of the scene, with comments. The organ is held at its lowest tenth along its longest side and
+    /// pulled at the other end. Damping is half of the critical damping of the slowest vibration along that
+    /// side.
     ///
     /// ```
     /// use pliant_geometry::Vector3;
@@ -112,7 +113,7 @@ impl OrganScene {
     }
 }
 
-/// To three digits.
+/// Rounds to three digits.
 fn rounded(value: f64) -> f64 {
     format!("{value:.2e}").parse().unwrap_or(value)
 }

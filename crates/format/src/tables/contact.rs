@@ -9,37 +9,37 @@ use serde::Deserialize;
 use super::body::{CleanTable, Label};
 use super::load::{RotateTable, Timing};
 
-/// A rigid thing that bodies touch: an obstacle such as a bone, or a tool. It stands where `at` and `turn`
-/// put it, and moves by one of `by`, `rotate` and `poses`, or not at all. Curve: `smooth-step` if not given.
-/// What touches it is named by `[contact.NAME]`.
+/// A rigid thing that bodies touch: an obstacle such as a bone, or a tool. `at` and `turn` set its pose; it
+/// moves by one of `by`, `rotate` and `poses`, or not at all. Curve: `smooth-step` if not given.
+/// `[contact.NAME]` names the bodies that touch it.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct ToolTable {
     /// Its shape, around the origin of its own frame.
     pub shape: ShapeName,
-    /// Where the origin of its frame is [m].
+    /// Position of the origin of its frame [m].
     #[serde(default)]
     pub at: [f64; 3],
-    /// How its frame is turned [rad]: about the axis of this vector by its length.
+    /// Rotation of its frame [rad]: about the axis of this vector, by its length.
     #[serde(default)]
     pub turn: [f64; 3],
-    /// True if bodies are inside of it, as a brain in its skull.
+    /// True if bodies are inside, as a brain in its skull.
     #[serde(default)]
     pub inside: bool,
-    /// How far the jaws are open over time, of a tool with jaws; closed if not given.
+    /// Opening of the jaws over time, for a tool with jaws; closed if not given.
     #[serde(default)]
     pub opening: Option<OpeningTable>,
-    /// The angle [rad] between jaws from which on down they hold all that touches their inner faces, as if
-    /// tied; they let go where they open wider. If not given, they hold by the contact's friction.
+    /// The angle [rad] between jaws at or below which they hold everything that touches their inner faces, as
+    /// if tied. They let go when they open wider. If not given, they hold by the contact's friction.
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub ideal_grip: Option<f64>,
-    /// The force [N] that it pushes with at most. From half of it on it gives way, and lags behind its
-    /// trajectory; when nothing is in its way any more, it catches up.
+    /// Largest force [N] with which it pushes. From half of this force on it gives way, and lags behind its
+    /// trajectory. When the obstacle is gone, it catches up.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub force_limit: Option<f64>,
-    /// By how much it grows over time.
+    /// Growth over time.
     #[serde(default)]
     pub grows: Option<GrowthTable>,
     /// Displacement [m], reached along the curve.
@@ -48,9 +48,9 @@ pub struct ToolTable {
     /// Rotation about an axis, reached along the curve.
     #[serde(default)]
     pub rotate: Option<RotateTable>,
-    /// A CSV file of poses: a row for each time [s] with a position [m] and a unit quaternion, columns t, x,
-    /// y, z, qw, qx, qy, qz. In between it moves on straight ways and shortest arcs; before the first and
-    /// after the last row it rests.
+    /// A CSV file of poses. A row for each time [s] has a position [m] and a unit quaternion, in columns t,
+    /// x, y, z, qw, qx, qy, qz. Between rows it moves on straight lines and shortest arcs; before the first
+    /// and after the last row it rests.
     #[serde(default)]
     pub poses: Option<PathBuf>,
     /// Its curve over time.
@@ -64,7 +64,7 @@ pub struct ToolTable {
 pub enum ShapeName {
     /// A ball around the origin.
     Sphere(SphereTool),
-    /// All within a radius of a segment along z, centred at the origin.
+    /// The points within a radius of a segment along z, centred at the origin.
     Capsule(CapsuleTool),
     /// A cylinder along z with flat ends, centred at the origin.
     Cylinder(CylinderTool),
@@ -72,7 +72,7 @@ pub enum ShapeName {
     Box(BoxTool),
     /// A cone along z: its base in the plane z = 0, its tip above.
     Cone(ConeTool),
-    /// All below the plane z = 0: `shape = "half-space"`.
+    /// The space below the plane z = 0: `shape = "half-space"`.
     HalfSpace,
     /// A body of revolution about the z axis, such as a funnel with its tube when `inside = true`. Not on
     /// GPUs.
@@ -80,7 +80,7 @@ pub enum ShapeName {
     /// Two jaws of a grasper: boxes along z from a hinge at the origin, which open about the x axis. They are
     /// `NAME.upper` and `NAME.lower`.
     Jaws(JawsTool),
-    /// What the closed surface of a mesh file encloses.
+    /// The volume that the closed surface of a mesh file encloses.
     Mesh(MeshTool),
     /// A part of a segmented image.
     Image(ImageTool),
@@ -95,7 +95,7 @@ pub struct SphereTool {
     pub radius: f64,
 }
 
-/// All within a radius of a segment.
+/// The points within a radius of a segment.
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct CapsuleTool {
@@ -144,8 +144,8 @@ pub struct ConeTool {
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct RevolvedTool {
     /// Its outline from below upwards: heights, distances from the axis, and radii of the arcs in place of
-    /// corners [m]. All between it and the axis is in it. Beyond an end off the axis the outline goes
-    /// straight on.
+    /// corners [m]. The body is the space between outline and axis. Beyond an end off the axis the outline
+    /// continues straight.
     pub outline: Vec<[f64; 3]>,
 }
 
@@ -174,7 +174,7 @@ pub struct OpeningTable {
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 3.0))]
     pub angle: Option<f64>,
-    /// The same angle [degrees], instead of `angle`.
+    /// The angle [degrees], instead of `angle`.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 170.0))]
     pub degrees: Option<f64>,
@@ -183,8 +183,8 @@ pub struct OpeningTable {
     pub timing: Timing,
 }
 
-/// How a rigid thing grows: its surface moves outward, by 0 at `from` and the whole distance at `to`; of a
-/// thing with `inside = true` the room in it grows. Edges become round. A table lets it shrink again:
+/// Growth of a rigid thing: its surface moves outward, by 0 at `from` and the whole distance at `to`. With
+/// `inside = true` the room inside grows. Edges become round. A table lets it shrink again:
 /// `curve = { table = [[0, 0], [1, 1], [2, 0.2]] }`. Balls and capsules may shrink below the size of their
 /// shape. Not on GPUs. Curve: `smooth-step` if not given.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -197,8 +197,8 @@ pub struct GrowthTable {
     pub timing: Timing,
 }
 
-/// What the surface of a mesh file encloses. Distances to it are sampled once on a grid, and kept in the
-/// cache.
+/// The volume that the surface of a mesh file encloses. Distances to the surface are sampled once on a grid,
+/// and kept in the cache.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct MeshTool {
@@ -214,7 +214,7 @@ pub struct MeshTool {
     #[serde(default)]
     pub grow: f64,
     /// Distance [m] between the points of the grid. If not given, 1/256 of the diagonal of the box, or half
-    /// of the mean edge of the triangles if this is less, as far as the grid fits into 64 MiB.
+    /// of the mean edge of the triangles if this is less. The grid is coarser if it does not fit into 64 MiB.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub resolution: Option<f64>,
@@ -253,7 +253,7 @@ pub struct ImageTool {
     pub resolution: Option<f64>,
 }
 
-/// How the distances of a surface are sampled.
+/// Settings for sampling the distances of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampling {
     /// Distance [m] by which the surface is moved outward.
@@ -263,82 +263,84 @@ pub struct Sampling {
 }
 
 impl MeshTool {
-    /// How its distances are sampled.
+    /// Settings for sampling its distances.
     pub fn sampling(&self) -> Sampling {
         Sampling { grow: self.grow, resolution: self.resolution }
     }
 }
 
 impl ImageTool {
-    /// How its distances are sampled.
+    /// Settings for sampling its distances.
     pub fn sampling(&self) -> Sampling {
         Sampling { grow: self.grow, resolution: self.resolution }
     }
 }
 
-/// Who touches whom: a body an obstacle or a tool, another body, or itself. With the solver `explicit`, for
-/// bodies without bending, impulses keep surfaces apart; bodies that touch each other are solids. With the
-/// solvers `implicit` and `static`, for solids and shells, a barrier does. Only barriers exclude
-/// intersections: no state that is accepted has one. The force on the second is in `csv` outputs as
-/// `contact.NAME`.
+/// Contact of a body with an obstacle or a tool, with another body, or with itself. With the solver
+/// `explicit`, for bodies without bending, impulses keep surfaces apart; only solids can touch each other.
+/// With the solvers `implicit` and `static`, for solids and shells, a barrier keeps surfaces apart. Only
+/// barriers exclude intersections: no accepted state has an intersection. `csv` outputs have the force on the
+/// second body as `contact.NAME`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ContactTable {
-    /// The body, and what it touches: `between = ["liver", "probe"]`. The same body twice: itself. `"all"`:
-    /// all solids, obstacles and tools; with the solvers `implicit` and `static` also shells and membranes
-    /// that are not `on` a solid. Each pair has an entry of its own, `contact.NAME.liver-probe`.
+    /// The body, and the thing that it touches: `between = ["liver", "probe"]`. The same body twice means
+    /// self-contact. `"all"`: all solids, obstacles and tools; with the solvers `implicit` and `static` also
+    /// shells and membranes that are not `on` a solid. Each pair has an entry of its own,
+    /// `contact.NAME.liver-probe`.
     pub between: [String; 2],
-    /// The faces of the first that touch; if not given, all of its boundary.
+    /// Faces of the first body that touch; if not given, its whole boundary.
     #[serde(default)]
     pub faces: Option<Selection>,
-    /// The faces of the second, if that is another body; if not given, all of its boundary.
+    /// Faces of the second, if it is another body; if not given, its whole boundary.
     #[serde(default)]
     pub other_faces: Option<Selection>,
     /// Coulomb's coefficient of friction [1].
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub friction: f64,
-    /// Distance [m] that the surfaces keep. If not given: with the solver `explicit` 0.5 % of the mean edge
-    /// between two bodies and of a body with itself, 0 from a rigid thing; with the solvers `implicit` and
-    /// `static` half of the thickness of each shell that takes part. Nodes of explicit bodies that are nearer
-    /// at the start keep the distance that they have.
+    /// Distance [m] that the surfaces keep. If not given with the solver `explicit`, 0.5 % of the mean edge
+    /// for bodies and self-contact, and 0 from a rigid thing. If not given with the solvers `implicit` and
+    /// `static`, half of the thickness of each shell that takes part. Nodes of explicit bodies that are
+    /// nearer at the start keep their distance.
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub thickness: Option<f64>,
-    /// The gap [m], in addition to `thickness`, below which surfaces push each other away, with the solvers
-    /// `implicit` and `static`; a thousandth of the diagonal of all bodies if not given.
+    /// The gap [m], in addition to `thickness`, below which surfaces push each other away. A thousandth of
+    /// the diagonal of all bodies if not given. With the solvers `implicit` and `static`.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub barrier_distance: Option<f64>,
-    /// Stiffness κ [Pa] of the barrier: at the gap y times its distance it presses by κ (2 (y − 1) ln y +
+    /// Stiffness κ [Pa] of the barrier. At the gap y times its distance, its pressure is κ (2 (y − 1) ln y +
     /// (y − 1)²/y). A tenth of Young's modulus of the softest body of the contact if not given.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub barrier_stiffness: Option<f64>,
-    /// How often each triangle of a shell is divided into four on its curved surface, which touches in its
-    /// place: 0, flat triangles, 1 or 2. With the solvers `implicit` and `static`.
+    /// Number of times that each triangle of a shell is divided into four on its curved surface, which
+    /// touches in its place: 0 (flat triangles), 1 or 2. With the solvers `implicit` and `static`.
     #[serde(default)]
     #[schemars(range(max = 2))]
     pub subdivision: Option<u8>,
-    /// Speed [m/s] below which bodies creep that friction should hold, with the solvers `implicit` and
+    /// Largest speed [m/s] at which bodies creep that friction should hold. With the solvers `implicit` and
     /// `static`; 0.001 if not given.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub creep_speed: Option<f64>,
-    /// Whether states are searched for edges that go through triangles, by a way of its own. With the solvers
-    /// `implicit` and `static` the search looks at each state; an intersection would be a fault of the
-    /// program, and ends the run. With the solver `explicit` the search looks at the states that outputs
-    /// write and at the last one, and counts the intersections of bodies that are deeper than 1e-4 of the
-    /// mean edge: a warning, and `intersections` in `--json`. Holds for all contacts of the solver.
+    /// True to search states for edges that go through triangles, independently of the contact search. With
+    /// the solvers `implicit` and `static` the search looks at each state; an intersection would be a fault
+    /// of the program, and ends the run. With the solver `explicit` the search looks at the last state and
+    /// the states that outputs write. It counts the intersections of bodies that are deeper than 1e-4 of the
+    /// mean edge, in a warning and in `intersections` of `--json`. Holds for all contacts of the solver.
     #[serde(default)]
     pub check_intersections: bool,
-    /// Whether bodies that overlap at the start are pushed apart before the run, by the least ways of their
-    /// nodes. The shape at rest stays as it is, so that the run starts deformed. Without it they are refused.
+    /// True to push bodies that overlap at the start apart before the run, with the smallest displacements of
+    /// their nodes. The shape at rest stays, so that the run starts deformed. Without this key overlapping
+    /// bodies are an error.
     #[serde(default)]
     pub separate: bool,
     /// Gap [m] between the shapes at rest, beyond the distance that surfaces keep. Where bodies overlap or
-    /// are nearer, their nodes at rest move apart by the least ways, so that the run starts without stress.
-    /// For organs that touch in one segmentation and are meshed one by one.
+    /// are nearer, their nodes at rest move apart by the smallest displacements, so that the run starts
+    /// without stress. For organs that touch in one segmentation and are meshed one by one.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub gap: Option<f64>,

@@ -1,11 +1,11 @@
-//! How the solvers `implicit` and `static` solve their equations.
+//! Settings for the equations of the solvers `implicit` and `static`.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Axis;
 
-/// How linear equations are solved: one word, or a table with settings.
+/// Solver of linear equations: one word, or a table with settings.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum LinearWay {
@@ -35,7 +35,7 @@ impl LinearWay {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum LinearName {
-    /// Factors of the symmetric stiffness: robust, and unstable equilibria are noticed.
+    /// Factors of the symmetric stiffness: robust, and detects unstable equilibria.
     #[default]
     Direct,
     /// Factors of the stiffness with the unsymmetric part of loads: twice the work, for moments about fixed
@@ -55,15 +55,16 @@ pub struct LinearTable {
     #[serde(default = "thousandth")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub tolerance: f64,
-    /// Iterations of conjugate gradients at the most.
+    /// Most iterations of conjugate gradients.
     #[serde(default = "thousand")]
     #[schemars(range(min = 1, max = 1_000_000))]
     pub iterations: u32,
-    /// What conjugate gradients multiply residuals by.
+    /// Preconditioner, by which conjugate gradients multiply residuals.
     #[serde(default)]
     pub preconditioner: PreconditionerName,
-    /// Whether an `implicit` step goes on with what conjugate gradients have reached when their iterations
-    /// run out, instead of ending the run: bounded time, for real time. The summary tells the residual.
+    /// True if an `implicit` step accepts the result of conjugate gradients when their iterations run out,
+    /// instead of ending the run. This bounds the time of a step, for real time. The summary shows the
+    /// residual.
     #[serde(default)]
     pub accept_stalled: bool,
 }
@@ -89,47 +90,48 @@ fn thousand() -> u32 {
     1000
 }
 
-/// What conjugate gradients multiply residuals by.
+/// Preconditioner, by which conjugate gradients multiply residuals.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum PreconditionerName {
-    /// The factors of an older stiffness, made anew once they need more than ten iterations.
+    /// The factors of an older stiffness, computed again once they need more than ten iterations.
     LaggedFactors,
     /// The inverse of each node's own block: the least memory.
     BlockJacobi,
-    /// This, and a solution for the rigid motions of groups of neighbouring nodes: far fewer iterations on
-    /// many elements.
+    /// Block Jacobi with a solution for the rigid motions of groups of neighbouring nodes: far fewer
+    /// iterations on many elements.
     #[default]
     Aggregates,
 }
 
-/// What a static run prescribes instead of the size of one load: exactly one of `displacement`, `arc-length`,
-/// `volume`. It finds the factor of the load, equal in all its load steps.
+/// Quantity that a static run prescribes instead of the size of one load: exactly one of `displacement`,
+/// `arc-length`, `volume`. The run prescribes it in equal parts in its load steps, and finds the factor of
+/// the load.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ControlTable {
     /// The load whose factor is found; it has no curve of its own.
     pub load: String,
-    /// How a node moves over the whole run, in equal parts.
+    /// Motion of a node over the whole run, in equal parts.
     #[serde(default)]
     pub displacement: Option<ControlledNode>,
-    /// Length [m] that all displacements together go in a load step, √Σ|Δu|². The path ends where `stop`
-    /// says, or with the last load step.
+    /// Length [m] of the increment of all displacements in a load step, √Σ|Δu|². The path ends at `stop`, or
+    /// with the last load step.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub arc_length: Option<f64>,
-    /// Where a path by `arc-length` ends before its last load step; if not given, at a load factor of 1,
-    /// where the load is as written.
+    /// End of a path by `arc-length` before its last load step. If not given, a load factor of 1, where the
+    /// load is as written.
     #[serde(default)]
     pub stop: Option<StopTable>,
-    /// Volume [m³] that the pressurised triangles, which must be closed, enclose at the end; it changes in
+    /// Volume [m³] inside the pressurised triangles at the end; they must be closed. The volume changes in
     /// equal parts.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub volume: Option<f64>,
 }
 
-/// Where a path by arc length ends: at the first state that meets one of these.
+/// End of a path by arc length: the first state that meets one of these conditions.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct StopTable {
@@ -137,21 +139,21 @@ pub struct StopTable {
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub load_factor: Option<f64>,
-    /// How far a node has moved.
+    /// Displacement of a node.
     #[serde(default)]
     pub displacement: Option<ControlledNode>,
-    /// Number of limit points passed, where the load turns round.
+    /// Number of limit points passed, where the load turns back.
     #[serde(default)]
     #[schemars(range(min = 1))]
     pub limit_points: Option<u32>,
 }
 
-/// How an implicit run goes on in time.
+/// Time integrator of an implicit run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum IntegratorName {
-    /// Backward Euler, of first order: robust, and it damps a vibration of f hertz in steps of h seconds by
-    /// about π f h of critical.
+    /// Backward Euler, of first order: robust. In steps of h seconds it damps a vibration of f hertz by about
+    /// π f h of critical damping.
     #[default]
     BackwardEuler,
     /// The backward differentiation formula of second order: it damps by about 62 (f h)³ of critical, and
@@ -167,8 +169,8 @@ pub struct ControlledNode {
     pub body: String,
     /// Place at rest [m]; its nearest node is meant.
     pub at: [f64; 3],
-    /// Which component.
+    /// Component of the displacement.
     pub component: Axis,
-    /// How far it moves in the end [m].
+    /// Displacement at the end [m].
     pub by: f64,
 }

@@ -24,7 +24,7 @@ pub enum Axis {
     Rz,
 }
 
-/// How a motion or a load grows.
+/// Growth of a motion or a load over time.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum CurveShape {
@@ -32,10 +32,10 @@ pub enum CurveShape {
     Ramp,
     /// 3s² − 2s³: starts and ends without a jolt.
     SmoothStep,
-    /// 10s³ − 15s⁴ + 6s⁵: smoother still.
+    /// 10s³ − 15s⁴ + 6s⁵: even smoother.
     #[serde(rename = "polynomial-10-15-6")]
     Polynomial,
-    /// All of it from the start.
+    /// The full value from the start.
     Hold,
     /// From 0 to 1 and back without a jolt, again and again, in this period [s]: breath, a beating heart.
     Wave(f64),
@@ -43,9 +43,9 @@ pub enum CurveShape {
     Table(Vec<[f64; 2]>),
 }
 
-/// The curve over time: the factor goes from 0 at `from` to 1 at `to`. Where it is not 0 at t = 0, `explicit`
-/// and `implicit` runs begin with moved nodes there, at rest, and count the energy stored as external work;
-/// `static` and `quasi-static` get there in the first load step.
+/// The curve over time: the factor goes from 0 at `from` to 1 at `to`. If the factor is not 0 at t = 0,
+/// `explicit` and `implicit` runs begin with the nodes moved and at rest. They count the stored energy as
+/// external work. `static` and `quasi-static` runs move them in the first load step.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct Timing {
@@ -67,26 +67,27 @@ pub struct Timing {
 pub struct FixTable {
     /// The body.
     pub body: String,
-    /// Which nodes.
+    /// Selected nodes.
     pub nodes: Selection,
     /// Components held; if not given, all: of shells also the rotations, which clamps them.
     #[serde(default)]
     pub components: Option<Vec<Axis>>,
 }
 
-/// Nodes whose mean displacement is prescribed, each of them free by itself: a face under a plate that tilts.
-/// Weighted by the area of the boundary at each node where the nodes have whole faces, else equally. Its
-/// reaction is the force of the plate. With every solver on the CPU but explicit shells.
+/// Nodes whose mean displacement is prescribed, while each node is free: a face under a plate that tilts. If
+/// the nodes have whole faces, the mean is weighted by the area of the boundary at each node; otherwise all
+/// nodes count equally. The reaction is the force of the plate. With every solver on the CPU except explicit
+/// shells.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct MeanTable {
     /// The body.
     pub body: String,
-    /// Which nodes.
+    /// Selected nodes.
     pub nodes: Selection,
     /// Mean displacement [m], reached along the curve.
     pub by: [f64; 3],
-    /// Components of it that are prescribed; if not given, all three.
+    /// Components that are prescribed; if not given, all three.
     #[serde(default)]
     pub components: Option<Vec<Axis>>,
     /// Its curve over time.
@@ -95,32 +96,34 @@ pub struct MeanTable {
 }
 
 /// A rigid part of a body, such as bone or an implant: its nodes keep their distances, and move and turn
-/// together, free in space; those of shells turn with it. With every solver on the CPU but explicit shells.
+/// together, free in space. The rotations of shell nodes turn with the part. With every solver on the CPU
+/// except explicit shells.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct RigidTable {
     /// The body.
     pub body: String,
-    /// Which nodes.
+    /// Selected nodes.
     pub nodes: Selection,
 }
 
 /// A closed surface whose volume is prescribed by a uniform pressure within, however large: a balloon, an
-/// eye, a full bladder. Columns `volume.NAME` [m³] and `pressure.NAME` [Pa] of tables tell both. With every
-/// solver on the CPU but explicit shells.
+/// eye, a full bladder. Columns `volume.NAME` [m³] and `pressure.NAME` [Pa] of tables record both. With every
+/// solver on the CPU except explicit shells.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct VolumeTable {
     /// The body, a solid, a membrane or a shell.
     pub body: String,
-    /// Which of its faces; if not given, all of its boundary. They close, and may be those of a cavity.
+    /// Faces of the surface; if not given, the whole boundary. They have to be closed, and may be the faces
+    /// of a cavity.
     #[serde(default)]
     pub faces: Option<Selection>,
-    /// By how much the enclosed volume grows from that at rest [m³], along the curve; 0 keeps it, less than 0
-    /// empties it.
+    /// Growth of the enclosed volume from rest [m³], along the curve; 0 keeps the volume, less than 0 empties
+    /// it.
     pub by: f64,
-    /// The pressure [Pa] that it takes at most, of suction likewise. There the volume lags behind its curve;
-    /// when less is needed, it catches up. With the solvers `implicit` and `static`.
+    /// Largest pressure or suction [Pa]. At this pressure the volume lags behind its curve; when less is
+    /// needed, it catches up. With the solvers `implicit` and `static`.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub pressure_limit: Option<f64>,
@@ -136,7 +139,7 @@ pub struct VolumeTable {
 pub struct SpringTable {
     /// The body.
     pub body: String,
-    /// Which nodes.
+    /// Selected nodes.
     pub nodes: Selection,
     /// Stiffness of the spring of each node [N/m].
     #[schemars(extend("exclusiveMinimum" = 0.0))]
@@ -153,7 +156,7 @@ pub struct SpringTable {
 pub struct MoveTable {
     /// The body.
     pub body: String,
-    /// Which nodes.
+    /// Selected nodes.
     pub nodes: Selection,
     /// Displacement [m], reached along the curve: one for all nodes, or one for each node from a file.
     #[serde(default)]
@@ -173,8 +176,8 @@ pub struct MoveTable {
     /// rotation takes all three.
     #[serde(default)]
     pub components: Option<Vec<Axis>>,
-    /// The force [N] that they push with at most, as their reaction tells. From half of it on they give way
-    /// together, and lag behind their motion; when nothing is in their way any more, they catch up. With the
+    /// Largest force [N] with which they push, measured by their reaction. From half of this force on they
+    /// give way together, and lag behind their motion. When the obstacle is gone, they catch up. With the
     /// solvers `implicit` and `static`.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
@@ -195,7 +198,7 @@ pub struct RotateTable {
     /// Angle [rad] by which it turns, right-handed about the axis; 6.2832 is a whole turn.
     #[serde(default)]
     pub angle: Option<f64>,
-    /// The same angle [degrees], instead of `angle`; 360 is a whole turn.
+    /// The angle [degrees], instead of `angle`; 360 is a whole turn.
     #[serde(default)]
     pub degrees: Option<f64>,
 }
@@ -204,7 +207,7 @@ pub struct RotateTable {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Vectors {
-    /// The same for all nodes.
+    /// One vector for all nodes.
     Uniform([f64; 3]),
     /// One for each node.
     PerNode(NodeVectors),
@@ -214,7 +217,7 @@ pub enum Vectors {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct NodeVectors {
-    /// Where they come from.
+    /// Source of the vectors.
     #[serde(flatten)]
     pub from: NodeVectorSource,
     /// Factor on them: the size of one unit of the data in metres (0.001 for millimetres) or newtons.
@@ -226,13 +229,13 @@ fn one() -> f64 {
     1.0
 }
 
-/// Where vectors on nodes come from.
+/// Source of vectors on nodes.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum NodeVectorSource {
     /// The name of a point-data array of three components in the body's mesh file.
     PointData(String),
-    /// A file beside the scene with a row `node,x,y,z` for each of the nodes, with or without a header; nodes
+    /// A file beside the scene with a row `node,x,y,z` for each node, with or without a header. Nodes are
     /// counted from 0 in the order of the mesh file.
     Csv(PathBuf),
 }
@@ -243,7 +246,7 @@ pub enum NodeVectorSource {
 pub struct ForceTable {
     /// The body or the carried surface.
     pub on: String,
-    /// Which nodes.
+    /// Selected nodes.
     pub nodes: Selection,
     /// Force on each node [N]: the same for all, or one for each node of a body from a file.
     #[serde(default)]
@@ -263,7 +266,7 @@ pub struct ForceTable {
 pub struct MomentTable {
     /// The body.
     pub on: String,
-    /// Which nodes.
+    /// Selected nodes.
     pub nodes: Selection,
     /// Moment on each node [N m].
     #[serde(default)]
@@ -276,14 +279,14 @@ pub struct MomentTable {
     pub timing: Timing,
 }
 
-/// A force per length on edges of shells, of triangles both of whose ends are selected and which only one
-/// triangle has. Curve: `smooth-step` if not given.
+/// A force per length on edges of shells that only one triangle has and whose ends are both selected. Curve:
+/// `smooth-step` if not given.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct EdgeLoadTable {
     /// The body.
     pub on: String,
-    /// Which nodes.
+    /// Selected nodes.
     pub nodes: Selection,
     /// Force per length at rest [N/m]; its direction stays.
     pub traction: [f64; 3],
@@ -298,7 +301,7 @@ pub struct EdgeLoadTable {
 pub struct TractionTable {
     /// The body or the carried surface.
     pub on: String,
-    /// Which faces: those with all nodes selected.
+    /// Faces whose nodes are all selected.
     pub faces: Selection,
     /// Force per area at rest [Pa]; its direction stays.
     pub traction: [f64; 3],
@@ -307,19 +310,19 @@ pub struct TractionTable {
     pub timing: Timing,
 }
 
-/// Pressure on faces that follows them as they deform. Curve: `smooth-step` if not given.
+/// Pressure on faces, which follows the faces as they deform. Curve: `smooth-step` if not given.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct PressureTable {
     /// The body or the carried surface.
     pub on: String,
-    /// Which faces: those with all nodes selected.
+    /// Faces whose nodes are all selected.
     pub faces: Selection,
-    /// Pressure [Pa]; positive pushes a solid inwards, and a shell to the side that its triangles face (a
-    /// closed one that faces outwards is blown up).
+    /// Pressure [Pa]; positive pushes a solid inwards, and a shell to the side that its triangles face. A
+    /// closed shell that faces outwards is blown up.
     pub pressure: f64,
-    /// How it comes to the nodes of a shell; if not given, `curved` with `dkt-curved` and `lumped` with other
-    /// elements. Only these pairs go together.
+    /// Distribution of the pressure to the nodes of a shell. If not given, `curved` with `dkt-curved` and
+    /// `lumped` with other elements. Other pairs are not possible.
     #[serde(default)]
     pub spread: Option<SpreadName>,
     /// Its curve over time.
@@ -334,7 +337,7 @@ pub struct GravityTable {
     /// The body; if not given, all.
     #[serde(default)]
     pub on: Option<String>,
-    /// Which nodes of the body; if not given, all.
+    /// Nodes of the body; if not given, all nodes.
     #[serde(default)]
     pub nodes: Option<Selection>,
     /// Acceleration [m/s²].
@@ -344,7 +347,7 @@ pub struct GravityTable {
     pub timing: Timing,
 }
 
-/// How a pressure on a shell comes to its nodes.
+/// Distribution of a pressure on a shell to its nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SpreadName {

@@ -1,6 +1,6 @@
-//! The scene as the user wrote it: plain data, nothing computed. Every parameter is declared here once (or,
-//! for a law, beside its formulas) with meaning, unit, range and default; schema, checks and reference page
-//! come from that.
+//! The scene as the user wrote it: plain data, nothing computed. Every parameter is declared once with
+//! meaning, unit, range and default: here, or for a law beside its formulas. Schema, checks and reference
+//! page come from these declarations.
 
 mod body;
 mod contact;
@@ -48,7 +48,7 @@ pub const MOST_THREADS: u32 = 1024;
 /// Most parts that an edge of a shell is cut into in pictures.
 pub const MOST_CURVED: u32 = 100;
 
-/// What the scene is and how long it lasts.
+/// Title, duration and gravity of the scene.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct SceneTable {
@@ -58,7 +58,8 @@ pub struct SceneTable {
     /// Simulated time [s].
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub until: f64,
-    /// Acceleration of all bodies [m/s²], from the start; for one that grows, use a load of type `gravity`.
+    /// Acceleration of all bodies [m/s²], from the start; for an acceleration that grows, use a load of type
+    /// `gravity`.
     #[serde(default)]
     pub gravity: Option<[f64; 3]>,
 }
@@ -71,15 +72,16 @@ pub enum DesignName {
     /// Cells write forces into slots of their own, nodes gather them in a fixed order. The same bits every
     /// time.
     Gather,
-    /// Blocks of neighbouring nodes do a step in one kernel: they find the forces of all cells at their nodes
-    /// in shared memory and move them. Cells at the borders of blocks are found by each. The same bits every
-    /// time, forces of a limited range.
+    /// Blocks of neighbouring nodes do a step in one kernel. Each block computes the forces of all cells at
+    /// its nodes in shared memory, and moves the nodes. Cells at the borders of blocks are computed by each.
+    /// The same bits every time, forces of a limited range.
     Blocks,
-    /// Cells add their forces to those of the nodes by floating-point atomics, in any order: the last bits
-    /// vary from run to run.
+    /// Cells add their forces to the nodal forces by floating-point atomics, in any order: the last bits vary
+    /// from run to run.
     FloatAtomics,
-    /// Blocks of neighbouring cells add their forces up in shared memory, nodes gather the sums of their
-    /// blocks; shapes of plain tetrahedra at rest are found again from their nodes. The same bits every time.
+    /// Blocks of neighbouring cells add their forces up in shared memory, and nodes gather the sums of their
+    /// blocks. Shapes at rest of plain tetrahedra are computed again from their nodes. The same bits every
+    /// time.
     Fast,
 }
 
@@ -94,7 +96,7 @@ pub enum PrecisionName {
     Double,
 }
 
-/// What a run does when the limit falls below its step.
+/// Reaction of a run when the critical time step falls below its step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 #[schemars(rename = "OnUnstable")]
@@ -104,79 +106,79 @@ pub enum OnUnstableName {
     Substep,
     /// End with an error.
     Stop,
-    /// Go on at the same step; the smallest limit is reported.
+    /// Continue with the same step; the smallest limit is reported.
     Report,
 }
 
-/// How the scene is run.
+/// Settings of the run.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct RunTable {
-    /// Where the solver runs.
+    /// Device of the solver.
     #[serde(default)]
     pub device: DeviceName,
     /// The GPU, by a part of its name in `pliant devices`; if not given, the best one.
     #[serde(default)]
     pub adapter: Option<String>,
-    /// How the kernels of a GPU bring forces from cells to nodes; if not given, the ways that measured best:
-    /// `fast`, and `gather` on adapters that are software.
+    /// Design of the GPU kernels that bring forces from cells to nodes. If not given, the ways that measured
+    /// best: `fast`, and `gather` on adapters that are software.
     #[serde(default)]
     pub design: Option<DesignName>,
-    /// Number type of the solver; if not given, `double` on the CPU and `single` on a GPU, which has
-    /// no other.
+    /// Number type of the solver; if not given, `double` on the CPU and `single` on a GPU, which has only
+    /// this.
     #[serde(default)]
     pub precision: Option<PrecisionName>,
-    /// How the state goes from instant to instant.
+    /// Solver that advances the state in time.
     #[serde(default)]
     pub solver: SolverName,
-    /// Time step [s], made a little shorter where it does not divide the duration; `auto`: 0.9 × the critical
-    /// time step of the assembled model at rest, `load-steps` where the solver is `quasi-static` or `static`,
-    /// and 0.01 s where it is `implicit`.
+    /// Time step [s], made a little shorter if it does not divide the duration. `auto` is 0.9 × the critical
+    /// time step of the assembled model at rest. With the solvers `quasi-static` and `static`, `auto` follows
+    /// `load-steps`; with `implicit` it is 0.01 s.
     #[serde(default)]
     pub step: StepChoice,
-    /// What an explicit run does when the largest stable step of the deformed model, watched during the run,
-    /// falls below its step; if not given, `substep`.
+    /// Reaction of an explicit run when the critical time step of the deformed model falls below its step.
+    /// The critical step is watched during the run. If not given, `substep`.
     #[serde(default)]
     pub on_unstable: Option<OnUnstableName>,
     /// Makes the nodes that limit an explicit step heavier.
     #[serde(default)]
     pub mass_scaling: Option<MassScalingTable>,
-    /// Load steps of a quasi-static or static run with `step = "auto"`: so many equal ones, or the times at
-    /// which they end.
+    /// Load steps of a quasi-static or static run with `step = "auto"`: their number if equal, or the times
+    /// at which they end.
     #[serde(default)]
     pub load_steps: LoadSteps,
     /// Largest residual force over the largest internal force (or load, or inertial force) at which an
-    /// equilibrium is found; if not given, 1e-6 in double and 1e-4 in single precision with the solver
-    /// `quasi-static`, 1e-8 with `static`, 1e-6 with `implicit`.
+    /// equilibrium is found. If not given, 1e-8 with the solver `static` and 1e-6 with `implicit`. With
+    /// `quasi-static` 1e-6 in double and 1e-4 in single precision if not given.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub tolerance: Option<f64>,
-    /// Iterations of Newton's method at the most in a step of `implicit` (20 if not given) or `static` (40).
-    /// With 1 a step of `implicit` is one linear solution, and its residual is not checked: for real time.
+    /// Most iterations of Newton's method in a step of `implicit` (20 if not given) or `static` (40). With 1
+    /// a step of `implicit` is one linear solution, and its residual is not checked: for real time.
     #[serde(default)]
     #[schemars(range(min = 1, max = 10_000))]
     pub iterations: Option<u32>,
-    /// Speed [m/s] of all nodes below which a Newton step of `implicit` in contact is the last one; it is
-    /// still made. If not given, a step must move nothing by more than a thousandth of `barrier-distance`.
+    /// Speed [m/s] of all nodes below which a Newton step of `implicit` in contact is the last one; this step
+    /// is still made. If not given, a step must move no node by more than a thousandth of `barrier-distance`.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub speed_tolerance: Option<f64>,
-    /// Whether a step of `implicit` whose `iterations` run out, or whose energy does not fall any more, goes
-    /// on with what it has reached instead of being halved: bounded time, for real time. In contact that
-    /// state has no intersection. Summary and window tell how many steps did so.
+    /// True to accept the last state of an `implicit` step, instead of halving it, when its `iterations` run
+    /// out or its energy stops falling. This bounds the time of a step, for real time. In contact that state
+    /// has no intersection. Summary and window count these steps.
     #[serde(default)]
     pub accept_unconverged: Option<bool>,
-    /// How `implicit` goes on in time; `backward-euler` if not given.
+    /// Time integrator of `implicit`; `backward-euler` if not given.
     #[serde(default)]
     pub integrator: Option<IntegratorName>,
-    /// How `implicit` and `static` solve their linear equations.
+    /// Linear solver of `implicit` and `static`.
     #[serde(default)]
     pub linear: LinearWay,
-    /// What a `static` run prescribes instead of the size of a load, so that it goes past limit points.
+    /// Quantity that a `static` run prescribes instead of the size of a load, so that it passes limit points.
     #[serde(default)]
     pub control: Option<ControlTable>,
-    /// The part of the internal energy that a run may hold in hourglass modes of `hex8` at its end. With more
-    /// it writes all outputs and ends with an error: the shape of the elements is not resolved.
+    /// Part of the internal energy that may be in hourglass modes of `hex8` at the end of a run. With more,
+    /// the run writes all outputs and ends with an error: the shape of the elements is not resolved.
     #[serde(default = "tenth")]
     #[schemars(range(min = 0.0))]
     pub allow_hourglass: f64,
@@ -193,26 +195,26 @@ fn tenth() -> f64 {
     0.1
 }
 
-/// When checkpoints are written.
+/// Times of checkpoints.
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct CheckpointTable {
-    /// Simulated time between them [s]; there is one at the end, too.
+    /// Simulated time between checkpoints [s]; the last one is at the end.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub every: f64,
 }
 
-/// Mass added at the start for a larger critical time step: exactly one of `target-step` and `share`. It
-/// resists acceleration (and so damping acts on it); gravity and other loads act on the mass of the material,
-/// so that equilibria and their forces do not change.
+/// Mass added at the start for a larger critical time step: exactly one of `target-step` and `share`. The
+/// added mass resists acceleration, and damping acts on it. Gravity and other loads act on the mass of the
+/// material, so that equilibria and their forces do not change.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum MassScalingTable {
-    /// Critical time step [s] of the assembled model at rest that is reached at least, with little more mass
-    /// than it needs. The automatic `step` is 0.9 × as long.
+    /// Least critical time step [s] of the assembled model at rest, reached with little more mass than it
+    /// needs. The automatic `step` is 0.9 × as long.
     TargetStep(#[schemars(extend("exclusiveMinimum" = 0.0))] f64),
-    /// The most mass that is added, as a part of the mass of the materials: 0.01 is 1 %. The critical time
-    /// step becomes as long as it allows.
+    /// Most mass that is added, as a part of the mass of the materials: 0.01 is 1 %. The critical time step
+    /// becomes as long as this mass allows.
     Share(#[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0))] f64),
 }
 
@@ -220,9 +222,9 @@ pub enum MassScalingTable {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum LoadSteps {
-    /// So many equal ones.
+    /// Number of equal load steps.
     Count(#[schemars(range(min = 1, max = 1_000_000))] u32),
-    /// Unequal ones.
+    /// Unequal load steps.
     Times(LoadTimes),
 }
 
@@ -241,7 +243,7 @@ impl Default for LoadSteps {
 }
 
 impl LoadSteps {
-    /// The first one of a scene of a duration [s].
+    /// End of the first load step [s] of a scene of a duration [s].
     pub fn first(&self, until: f64) -> f64 {
         match self {
             Self::Count(count) => until / f64::from(*count),
@@ -249,7 +251,7 @@ impl LoadSteps {
         }
     }
 
-    /// Where unequal ones end [s]; the last one with the scene.
+    /// Ends of unequal load steps [s]; the last one ends with the scene.
     pub fn ends(&self, until: f64) -> Option<Vec<f64>> {
         let Self::Times(LoadTimes { times }) = self else { return None };
         let within = times.iter().copied().filter(|&time| time < until * (1.0 - 1e-9));
@@ -257,7 +259,7 @@ impl LoadSteps {
     }
 }
 
-/// How the state goes from instant to instant.
+/// Solver that advances the state in time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SolverName {
@@ -283,18 +285,18 @@ impl SolverName {
         }
     }
 
-    /// Whether it solves equations by Newton's method, for solids and shells together.
+    /// True if it solves equations by Newton's method, for solids and shells together.
     pub fn solves_equations(self) -> bool {
         matches!(self, Self::Implicit | Self::Static)
     }
 
-    /// Whether it knows no inertia.
+    /// True if it finds equilibria, without inertia.
     pub fn finds_equilibria(self) -> bool {
         matches!(self, Self::QuasiStatic | Self::Static)
     }
 }
 
-/// Where a solver runs.
+/// Device of a solver.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum DeviceName {
@@ -303,7 +305,8 @@ pub enum DeviceName {
     Cpu,
     /// A GPU.
     Gpu,
-    /// A GPU where there is one and it can run the scene, else the CPU; the run says which and why.
+    /// A GPU where there is one and it can run the scene, else the CPU; the run reports its choice and the
+    /// reason.
     Auto,
 }
 
@@ -331,7 +334,7 @@ impl Default for StepChoice {
     }
 }
 
-/// What every law can have beside its own parameters.
+/// Parameters that every law can have besides its own.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct LawExtras {
@@ -344,7 +347,7 @@ pub struct LawExtras {
     /// Relaxation by Prony series; any number of terms on either part of the stress.
     #[serde(default)]
     pub prony: Vec<PronyTerm>,
-    /// How the relaxation advances over a step.
+    /// Update of the relaxation over a step.
     #[serde(default)]
     pub prony_update: PronyUpdate,
 }

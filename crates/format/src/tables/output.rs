@@ -17,12 +17,13 @@ pub enum FieldName {
     Velocity,
     /// Rotation vector [rad] of the nodes of shells, of length at most π.
     Rotation,
-    /// Force [N] by which constraints hold or move a node; zero where it is free.
+    /// Force [N] by which constraints hold or move a node; zero for free nodes.
     Reaction,
-    /// Moment [N m] by which constraints hold or turn a node of a shell about itself; zero where it is free.
+    /// Moment [N m] by which constraints hold or turn a node of a shell about itself; zero for free nodes.
     ReactionMoment,
-    /// Deformation gradient F of a solid, a membrane or a bar (which keeps its thickness in it), the mean
-    /// over the element: nine numbers xx, xy, xz, yx, …, zz, of which xy is the change of x along y at rest.
+    /// Deformation gradient F of a solid, a membrane or a bar, as the mean over the element. The thickness of
+    /// membranes and bars stays constant in F. Nine numbers xx, xy, xz, yx, …, zz: xy is the change of x
+    /// along y at rest.
     DeformationGradient,
     /// Cauchy stress [Pa].
     CauchyStress,
@@ -38,19 +39,19 @@ pub enum FieldName {
     FibreStretch,
     /// Pressure [Pa], minus a third of the trace of the Cauchy stress.
     Pressure,
-    /// Volume ratio J that the law's volumetric part sees, to which `pressure` belongs: det F of the element,
-    /// of `tet4-anp` and the other averaged tets the mean over its nodes, of `hex8-full` the mean over the
-    /// element.
+    /// Volume ratio J in the law's volumetric part, to which `pressure` belongs: det F of the element. For
+    /// `tet4-anp` and the other averaged tets it is the mean over the nodes, for `hex8-full` the mean over
+    /// the element.
     #[serde(rename = "J")]
     VolumeRatio,
     /// The element's own det F, whatever its `J` is.
     #[serde(rename = "cell-J")]
     CellVolumeRatio,
     /// Strain energy of the instantaneous elastic law per volume at rest [J/m³], with the element's averages
-    /// of volume: times the volumes it sums to the stored energy.
+    /// of volume. Summed over the elements, times their volumes, it is the stored energy.
     EnergyDensity,
-    /// The longest stable step [s] of the element alone, of its stiffness at the instant; of shells that
-    /// at rest, which turns with them. The smallest one bounds the step of the whole.
+    /// Critical time step [s] of the element alone, from its current stiffness; for shells from the stiffness
+    /// at rest, which turns with them. The smallest value bounds the step of the whole model.
     ElementStep,
     /// Force per length in the wall of a shell or a membrane [N/m], as a tensor in space.
     MembraneForce,
@@ -67,36 +68,34 @@ pub enum FieldName {
     MembraneEnergy,
     /// Energy of bending and twisting a shell, per area at rest [J/m²].
     BendingEnergy,
-    /// Energy of nodes of a shell that turn about the normal otherwise than their triangle, per area at rest
-    /// [J/m²]: not of the wall; much of it means that the mesh is too coarse.
+    /// Energy of nodes of a shell that turn about the normal differently from their triangle, per area at
+    /// rest [J/m²]. It is artificial; a large value means that the mesh is too coarse.
     DrillingEnergy,
     /// Thickness of a shell or a membrane at rest [m].
     Thickness,
-    /// Thickness [m] with the strain across that plane stress asks for: of a membrane by its law, of a shell
-    /// t (A/A₀)^(−ν/(1−ν)), which its forces do not feel.
+    /// Thickness [m] with the transverse strain of plane stress. For a membrane its law gives it. For a shell
+    /// it is t (A/A₀)^(−ν/(1−ν)), and does not change its forces.
     CurrentThickness,
     /// Length of a bar over its length without force.
     AxialStretch,
     /// Force along a bar [N], positive where it pulls.
     AxialForce,
-    /// The larger size of the principal strains of a shell at its top and bottom; small-strain elasticity
-    /// holds to about 0.1.
+    /// Largest size of the principal strains of a shell at its top and bottom. Small-strain elasticity is
+    /// valid to about 0.1.
     SurfaceStrain,
     /// Sum of the forces [N] of contacts on a node.
     ContactForce,
     /// Pressure of contacts [Pa]: the force on a node along their normals, over its share of the deformed
-    /// faces that it presses on, a third of each triangle. Zero of nodes that touch nothing; not a number of
-    /// nodes that cannot.
+    /// faces that it presses on. Its share is a third of each triangle. Zero for nodes without contact; not a
+    /// number for nodes that cannot touch anything.
     ContactPressure,
     /// Least signed distance [m] of a node from the obstacles, tools and bodies that it may touch, less the
-    /// `thickness` of the contact; bodies count up to a quarter of a mean edge. Not a number where there is
-    /// none.
+    /// `thickness` of the contact. Bodies count up to a quarter of a mean edge. Not a number if nothing is in
+    /// reach.
     Gap,
-    /// How far [m] a node has slid on what it touches since its touch began; not a number where it touches
-    /// nothing.
+    /// Distance [m] that a node has slid since its contact began; not a number without contact.
     Slip,
-    /// Whether constraints hold a node: 0 where it is free, 1 where it stays where it is at rest, 2 where it
-    /// is moved, 3 under a plate.
+    /// Constraint of a node: 0 for free, 1 for held at its place at rest, 2 for moved, 3 for under a plate.
     Constraint,
     /// Force [N] of loads on a node, without weights. Pressures on shells give a third of their force to each
     /// corner.
@@ -106,7 +105,7 @@ pub enum FieldName {
 }
 
 impl FieldName {
-    /// All of them.
+    /// List of all fields.
     pub const ALL: [Self; 37] = [
         Self::Displacement,
         Self::Velocity,
@@ -190,12 +189,12 @@ impl FieldName {
         }
     }
 
-    /// The field of a name, as it stands in scenes and files.
+    /// Returns the field of a name in scenes and files.
     pub fn of_name(name: &str) -> Option<Self> {
         serde_json::from_value(name.into()).ok()
     }
 
-    /// Its unit; empty for none.
+    /// Its unit; empty without one.
     pub fn unit(self) -> &'static str {
         match self {
             Self::Displacement | Self::Thickness | Self::CurrentThickness | Self::Gap | Self::Slip => "m",
@@ -323,7 +322,7 @@ impl FieldName {
         moved || self.is_of_contact() || self.is_of_marks()
     }
 
-    /// True for fields of what holds, moves and loads nodes.
+    /// True for fields of constraints and loads.
     pub(crate) fn is_of_marks(self) -> bool {
         matches!(self, Self::Constraint | Self::Load | Self::Weight)
     }
@@ -333,7 +332,7 @@ impl FieldName {
         matches!(self, Self::ContactForce | Self::ContactPressure | Self::Gap | Self::Slip)
     }
 
-    /// True for fields that surfaces on solids carry: those that say something between the nodes.
+    /// True for fields that surfaces on solids carry: they have values between the nodes.
     pub fn is_of_surface(self) -> bool {
         let of_nodes = matches!(self, Self::Rotation | Self::Reaction | Self::ReactionMoment);
         !of_nodes && !self.is_of_contact() && !self.is_of_marks()
@@ -371,7 +370,7 @@ impl FieldName {
     }
 }
 
-/// Where fields of cells are written.
+/// Place at which fields of cells are written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum At {
@@ -397,7 +396,7 @@ pub struct VtuTable {
     /// colours by one of them with `component`, and probes of a `csv` output write each into a column.
     #[serde(default = "default_fields")]
     pub data: Vec<FieldName>,
-    /// Where fields of cells are written.
+    /// Place at which fields of cells are written.
     #[serde(default)]
     pub at: At,
     /// Parts that each edge of a shell is cut into, to show its curved surface instead of flat triangles.
@@ -422,11 +421,11 @@ pub struct CsvTable {
     #[serde(default)]
     pub reactions: Option<Vec<String>>,
     /// A point [m], fixed in space, about which the moments of these reactions are written [N m], in columns
-    /// `moment.NAME.x`, `.y`, `.z`: the sum of (place − point) × force over the nodes where they are, and of
-    /// shells also of the moments on the nodes.
+    /// `moment.NAME.x`, `.y`, `.z`. A moment is the sum of (place − point) × force over the nodes at their
+    /// current places. For shells the moments on the nodes are added.
     #[serde(default)]
     pub moments_about: Option<[f64; 3]>,
-    /// Whether energies [J] are written.
+    /// True to write energies [J].
     #[serde(default = "yes")]
     pub energy: bool,
     /// Points of bodies or surfaces whose fields are written.

@@ -1,4 +1,4 @@
-//! Participants: bodies that one stepper advances together, apart from the others of the scene.
+//! Participants: bodies that one stepper advances together, apart from the other bodies of the scene.
 
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -10,34 +10,34 @@ use super::{
 
 /// Bodies with a solver and a step of their own. Bodies that no participant names follow `[run]`: with the
 /// solvers `implicit` and `static` all together, else the solids together and the shells together.
-/// Participants advance at their own steps and meet at common instants, where outputs see them. A key that is
-/// left out is as in `[run]`.
+/// Participants advance at their own steps and meet at common instants, where outputs are written. A key that
+/// is left out has the value of `[run]`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ParticipantTable {
     /// The bodies: solids or shells, with the solvers `implicit` and `static` also both.
     pub bodies: Vec<String>,
-    /// As in `[run]`.
+    /// Same as in `[run]`.
     #[serde(default)]
     pub solver: Option<SolverName>,
     /// Time step [s], as in `[run]`. Common instants are as far apart as the longest step of all
     /// participants; shorter steps are made a little shorter where they don't divide it.
     #[serde(default)]
     pub step: Option<StepChoice>,
-    /// As in `[run]`.
+    /// Same as in `[run]`.
     #[serde(default)]
     pub on_unstable: Option<OnUnstableName>,
-    /// As in `[run]`.
+    /// Same as in `[run]`.
     #[serde(default)]
     pub mass_scaling: Option<MassScalingTable>,
-    /// As in `[run]`.
+    /// Same as in `[run]`.
     #[serde(default)]
     pub load_steps: Option<LoadSteps>,
-    /// As in `[run]`.
+    /// Same as in `[run]`.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub tolerance: Option<f64>,
-    /// As in `[run]`.
+    /// Same as in `[run]`.
     #[serde(default)]
     #[schemars(range(min = 1, max = 10_000))]
     pub iterations: Option<u32>,
@@ -45,34 +45,34 @@ pub struct ParticipantTable {
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub speed_tolerance: Option<f64>,
-    /// As in `[run]`.
+    /// Same as in `[run]`.
     #[serde(default)]
     pub accept_unconverged: Option<bool>,
-    /// As in `[run]`.
+    /// Same as in `[run]`.
     #[serde(default)]
     pub integrator: Option<IntegratorName>,
-    /// As in `[run]`.
+    /// Same as in `[run]`.
     #[serde(default)]
     pub linear: Option<LinearWay>,
-    /// As in `[run]`.
+    /// Same as in `[run]`.
     #[serde(default)]
     pub control: Option<ControlTable>,
-    /// As in `[run]`.
+    /// Same as in `[run]`.
     #[serde(default)]
     pub precision: Option<PrecisionName>,
-    /// As in `[run]`.
+    /// Same as in `[run]`.
     #[serde(default)]
     pub device: Option<DeviceName>,
-    /// As in `[run]`.
+    /// Same as in `[run]`.
     #[serde(default)]
     pub adapter: Option<String>,
-    /// As in `[run]`.
+    /// Same as in `[run]`.
     #[serde(default)]
     pub design: Option<DesignName>,
 }
 
 impl ParticipantTable {
-    /// `[run]` with the keys that are given here in place of its own.
+    /// Returns `[run]` with its keys replaced by the keys that are given here.
     pub(crate) fn over(&self, run: &RunTable) -> RunTable {
         let run = run.clone();
         RunTable {

@@ -4,52 +4,52 @@ use pliant_geometry::Selection;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Ties the nodes of one body to another body, whose mesh need not match: they follow nodes of the other, and
-/// their forces and masses go there. For vessels inside an organ, walls on a surface, parts that are glued.
-/// Bodies of two participants are tied by springs, as stiff as their steps allow.
+/// Ties the nodes of one body to another body, whose mesh need not match. The tied nodes follow nodes of the
+/// other body, which take their forces and masses. For vessels inside an organ, walls on a surface, parts
+/// that are glued. Bodies of two participants are tied by springs, as stiff as their steps allow.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct TieTable {
     /// The body whose nodes follow, and the body that they follow: `between = ["vessels", "liver"]`. With
     /// `points`, take the finer or the softer one first.
     pub between: [String; 2],
-    /// How nodes follow. If not given, `mortar` where faces of one solid lie on those of another one, and
-    /// `points` elsewhere: walls, bars, a solid inside another one, and gaps wider than the default
-    /// `tolerance`.
+    /// Method by which nodes follow. If not given, `mortar` where faces of one solid lie on faces of another
+    /// solid. Elsewhere `points`: for walls, bars, a solid inside another one, and gaps wider than the
+    /// default `tolerance`.
     #[serde(default)]
     pub method: Option<TieMethod>,
     /// The nodes of the first body that follow; if not given, all inside or on the second.
     #[serde(default)]
     pub nodes: Option<Selection>,
-    /// Largest distance of such a node from the second body [m]; if not given, a tenth of its median edge.
+    /// Largest distance of a tied node from the second body [m]; if not given, a tenth of its median edge.
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub tolerance: Option<f64>,
-    /// What the rotations of tied nodes of a shell do, with the solvers `implicit` and `static`.
+    /// Behaviour of the rotations of tied nodes of a shell, with the solvers `implicit` and `static`.
     #[serde(default)]
     pub rotations: Rotations,
 }
 
-/// How nodes of a body follow another body.
+/// Method by which nodes of a body follow another body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum TieMethod {
-    /// Weighted means over the common area of faces of two solids, so that a constant stress passes in either
-    /// order.
+    /// Weighted means over the common area of faces of two solids, so that a constant stress is transmitted
+    /// in either order of the bodies.
     Mortar,
-    /// Each node follows the element of the other body in which it lies, or on whose surface.
+    /// Each node follows the element of the other body that holds it, or on whose surface it lies.
     Points,
 }
 
-/// What rotations of nodes of a shell do whose places go with a solid.
+/// Behaviour of the rotations of shell nodes that move with a solid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Rotations {
     /// They are unknowns of their own: a hinge.
     #[default]
     Free,
-    /// They follow the solid: the rotation of its deformation gradient there, that of the element that holds
-    /// the node, or the mean of those behind the faces of a wall round it. Moments go to the solid as
+    /// They follow the rotation of the solid's deformation gradient in the element that holds the node. On a
+    /// wall they follow the mean of the elements behind the faces around the node. Moments go to the solid as
     /// couples.
     Follow,
 }

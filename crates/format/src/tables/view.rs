@@ -1,4 +1,4 @@
-//! How a scene is looked at, in pictures and in the window.
+//! View of a scene, in pictures and in the window.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ pub trait Choice: DeserializeOwned {
     /// Its words in the scene file.
     const WORDS: &[&str];
 
-    /// What one of its words stands for; `None` for another one.
+    /// Choice that a word stands for; `None` for an unknown word.
     fn of_word(word: &str) -> Option<Self> {
         serde_json::from_value(word.into()).ok()
     }
@@ -37,24 +37,25 @@ impl Choice for TextureName {
     const WORDS: &[&str] = &["none", "skin"];
 }
 
-/// How pictures and films of the scene are taken (`pliant render`, `pliant run --picture`) and how the window
-/// opens (`pliant view`). It changes nothing of the run.
+/// View for pictures and films of the scene (`pliant render`, `pliant run --picture`) and for the window at
+/// the start (`pliant view`). It does not change the run.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ViewTable {
     /// The body or the carried surface that is shown; if not given, all bodies together.
     #[serde(default)]
     pub on: Option<String>,
-    /// What the colours tell; `label`: the labels of the elements, each in a colour of its own; `none`: the
-    /// colour of tissue. If not given, `von-mises`, and `displacement` on surfaces that shells carry.
+    /// Quantity that the colours show; `label`: the labels of the elements, each in a colour of its own;
+    /// `none`: the colour of tissue. If not given, `von-mises`, and `displacement` on surfaces that shells
+    /// carry.
     #[serde(default)]
     pub colour: Option<ColourBy>,
-    /// What is left out, so that what lies inside or behind is seen: labels of elements by number, name or
-    /// range, and bodies, obstacles and tools by name, as `[2, "tumour", "5-8", "grasper"]`. A name that both
-    /// have is that of the label.
+    /// Parts to hide, so that parts inside or behind are seen, as `[2, "tumour", "5-8", "grasper"]`. Labels
+    /// of elements are given by number, name or range, and bodies, obstacles and tools by name. A name that a
+    /// label and a body share means the label.
     #[serde(default)]
     pub hide: Vec<CellLabel>,
-    /// What looks otherwise than the rest, by names as in `hide`:
+    /// Parts that look different from the rest, by names as in `hide`:
     /// `look.liver = { opacity = 0.3, colour = "liver" }`. The opacity goes from 0 to 1; the colour is `view`
     /// (as the rest), `label`, `tissue`, `liver`, `brain`, `colon`, `artery`, `vein`, `tumour`, `bone` or
     /// `steel`.
@@ -64,59 +65,59 @@ pub struct ViewTable {
     /// a tensor needs one.
     #[serde(default)]
     pub component: Option<Component>,
-    /// The map of colours; all but `turbo` are even to eyes that see no red or green.
+    /// The map of colours; all but `turbo` look even to eyes that see no red or green.
     #[serde(default)]
     pub map: MapName,
-    /// Values of the first and the last colour, in SI units; if not given, those of all frames without the
-    /// outermost 0.5 %.
+    /// Values of the first and the last colour, in SI units; if not given, from the values of all frames
+    /// without the outermost 0.5 %.
     #[serde(default)]
     pub range: Option<[f64; 2]>,
-    /// Whether the edges of the elements are drawn.
+    /// True to draw the edges of the elements.
     #[serde(default)]
     pub edges: bool,
-    /// Whether nothing but the edges of the elements on the surface is drawn.
+    /// True to draw only the edges of the elements on the surface.
     #[serde(default)]
     pub wireframe: bool,
-    /// Whether the shape at rest is drawn, as a ghost.
+    /// True to draw the shape at rest, as a ghost.
     #[serde(default)]
     pub ghost: bool,
-    /// Whether fibres are drawn on the surface and in a section, as short lines that follow the deformation.
+    /// True to draw fibres on the surface and in a section, as short lines that follow the deformation.
     #[serde(default)]
     pub fibres: bool,
-    /// Whether the forces of contacts are drawn, through the bodies: a dot at each node that touches
-    /// something, and an arrow along the force on it. The note tells what the longest one stands for.
+    /// True to draw the forces of contacts, through the bodies: a dot at each node in contact, and an arrow
+    /// along the force on it. The note shows the force of the longest arrow.
     #[serde(default)]
     pub contacts: bool,
-    /// Whether constraints and loads are marked, through the bodies: squares where nodes are held, dots where
-    /// they are moved, bars under plates, arrows along the forces of loads, and one along the weight of all.
-    /// At most 300 of each kind are drawn.
+    /// True to mark constraints and loads, through the bodies. Squares mark held nodes, dots moved nodes, and
+    /// bars nodes under plates. Arrows point along the forces of loads, and one along the weight of all. At
+    /// most 300 of each kind are drawn.
     #[serde(default)]
     pub marks: bool,
-    /// Whether the element with the smallest `element-step` is marked, through the body. Shells are then
-    /// shown flat.
+    /// True to mark the element with the smallest `element-step`, through the body. Shells are then shown
+    /// flat.
     #[serde(default)]
     pub critical: bool,
-    /// Whether the largest value that the colours tell is marked: a ring at its place and the number. The
-    /// ring is dashed where something hides the place.
+    /// True to mark the largest value that the colours show, by a ring at its place and the number. The ring
+    /// is dashed if something hides the place.
     #[serde(default = "yes")]
     pub mark_maximum: bool,
-    /// Whether folds and contacts are darker, where less light from all sides arrives.
+    /// True to darken folds and contacts, where less light from all sides arrives.
     #[serde(default = "yes")]
     pub occlusion: bool,
-    /// What the surface is like; a texture stays where it is in the body at rest, and moves with it.
+    /// Texture of the surface. It is fixed in the body at rest, and moves with the body.
     #[serde(default)]
     pub texture: TextureName,
-    /// A plane: what lies on the side of its normal is taken away, and shows what is inside.
+    /// A cutting plane: everything on the side of its normal is taken away, so that the inside is seen.
     #[serde(default)]
     pub clip: Option<ClipTable>,
     /// The instant of a single picture [s]; if not given, the end of the run.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub at: Option<f64>,
-    /// Where it is seen from.
+    /// Camera of the view.
     #[serde(default)]
     pub camera: CameraTable,
-    /// What stands behind.
+    /// Background of the picture.
     #[serde(default)]
     pub background: BackgroundName,
     /// Width and height of pictures [pixels].
@@ -129,15 +130,15 @@ pub struct ViewTable {
     pub curved: u32,
 }
 
-/// How a body, an obstacle, a tool or the elements of a label look.
+/// Look of a body, an obstacle, a tool or the elements of a label.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct LookTable {
-    /// From 0, invisible, to 1, opaque: a body of 0.3 shows what lies inside.
+    /// Opacity from 0, invisible, to 1, opaque: a body of 0.3 shows its inside.
     #[serde(default = "one")]
     #[schemars(range(min = 0.0, max = 1.0))]
     pub opacity: f64,
-    /// What colours it.
+    /// Source of its colour.
     #[serde(default)]
     pub colour: LookColour,
 }
@@ -148,16 +149,16 @@ impl Default for LookTable {
     }
 }
 
-/// What colours a body, an obstacle, a tool or the elements of a label.
+/// Source of the colour of a body, an obstacle, a tool or the elements of a label.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum LookColour {
-    /// The same as the rest: `colour` of the view; steel for obstacles and tools.
+    /// Same as the rest: `colour` of the view; steel for obstacles and tools.
     #[default]
     View,
     /// The colour of each label.
     Label,
-    /// That of soft tissue.
+    /// The colour of soft tissue.
     Tissue,
     /// Dark red.
     Liver,
@@ -185,7 +186,7 @@ fn four() -> u32 {
     4
 }
 
-/// What colours tell.
+/// Quantity that colours show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum ColourBy {
@@ -245,7 +246,7 @@ impl Component {
         }
     }
 
-    /// Numbers of the values that have it: 3 of vectors, 9 of tensors.
+    /// Number of components of the values that have it: 3 for vectors, 9 for tensors.
     pub fn of(self) -> usize {
         if self.word().len() == 1 { 3 } else { 9 }
     }
@@ -272,7 +273,7 @@ pub enum MapName {
     BlueRed,
 }
 
-/// What a surface is like.
+/// Texture of a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum TextureName {
@@ -283,7 +284,7 @@ pub enum TextureName {
     Skin,
 }
 
-/// What stands behind a body.
+/// Background of a picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum BackgroundName {
@@ -306,29 +307,29 @@ pub struct ClipTable {
     pub normal: [f64; 3],
 }
 
-/// A camera that orbits what is shown.
+/// A camera that orbits its target.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct CameraTable {
-    /// Angle around the axis that points up [°]; with `up = "z"` 0 looks from the side of x, 90 from that of
-    /// y.
+    /// Angle around the axis that points up [°]; with `up = "z"` 0 looks from the side of x, 90 from the side
+    /// of y.
     #[serde(default = "azimuth")]
     pub azimuth: f64,
     /// Angle above the horizon [°].
     #[serde(default = "elevation")]
     #[schemars(range(min = -90.0, max = 90.0))]
     pub elevation: f64,
-    /// Magnification of what fits the picture.
+    /// Magnification; at 1 everything fits the picture.
     #[serde(default = "one")]
     #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 1000.0))]
     pub zoom: f64,
-    /// What is in the middle [m]; if not given, what fits the picture best.
+    /// Point in the middle of the picture [m]; if not given, the point that fits the picture best.
     #[serde(default)]
     pub target: Option<[f64; 3]>,
     /// The axis that points up; if not given, against gravity, and `z` without gravity.
     #[serde(default)]
     pub up: Option<UpName>,
-    /// Whether parallel lines stay parallel.
+    /// True if parallel lines stay parallel.
     #[serde(default)]
     pub orthographic: bool,
 }
@@ -395,18 +396,18 @@ impl UpName {
 }
 
 impl ViewTable {
-    /// Whether the colours are those of labels.
+    /// True if the colours show labels.
     pub fn shows_labels(&self) -> bool {
         matches!(self.colour, Some(ColourBy::Labels(_)))
     }
 
-    /// The regions that it hides of those there are. Others are left out: a scene that asks for them is
-    /// refused when it is built.
+    /// The existing regions that it hides. Other names are left out: a scene with them is refused when it is
+    /// built.
     pub fn hidden(&self, names: &RegionNames) -> Vec<Region> {
         self.hide.iter().filter_map(|name| names.find(name).ok()).flatten().collect()
     }
 
-    /// The regions with a look of their own, of those there are.
+    /// The existing regions with a look of their own.
     pub fn looks(&self, names: &RegionNames) -> Vec<(Region, LookTable)> {
         let regions = |name: &String| names.find(&CellLabel::Name(name.clone())).unwrap_or_default();
         let of = |(name, look): (&String, &LookTable)| {
@@ -420,7 +421,7 @@ impl ViewTable {
 mod tests {
     use super::*;
 
-    /// All words, as the schema has them.
+    /// Checks that the words are the schema's.
     fn same<T: Choice + JsonSchema>() {
         let schema = schemars::schema_for!(T);
         let known = schema.get("oneOf").and_then(|choices| choices.as_array()).unwrap();

@@ -67,7 +67,7 @@ impl<'a> Base64<'a> {
         Some(bytes)
     }
 
-    /// All bytes up to the end of the text; `None` if it holds other characters.
+    /// Returns the bytes up to the end of the text; `None` if it holds other characters.
     pub fn rest(&mut self) -> Option<Vec<u8>> {
         let mut bytes = Vec::new();
         while !self.text.as_slice().trim_ascii().is_empty() {

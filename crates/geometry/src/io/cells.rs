@@ -45,7 +45,7 @@ impl FileKind {
     }
 }
 
-/// All cells of one kind.
+/// Cells of one kind.
 struct Block {
     kind: FileKind,
     nodes: Vec<u32>,
@@ -53,7 +53,7 @@ struct Block {
     sets: BTreeMap<String, Vec<u32>>,
 }
 
-/// Where the cells that came from one cell of the file are.
+/// Range of the cells that came from one cell of the file.
 #[derive(Clone, Copy)]
 struct Span {
     block: u32,
@@ -88,7 +88,7 @@ impl Cells {
         self.push_of(FileKind::Kept(kind), nodes);
     }
 
-    /// The same for a cell of any kind that can be read.
+    /// Adds a cell of any readable kind to the open cell of the file.
     pub(crate) fn push_of(&mut self, kind: FileKind, nodes: &[u32]) {
         let at = self.blocks.iter().position(|block| block.kind == kind).unwrap_or_else(|| {
             let (data, sets) = (BTreeMap::new(), BTreeMap::new());
@@ -187,8 +187,8 @@ impl Cells {
         }
     }
 
-    /// The mesh, or the reason for its absence; adds notes about skipped and split cells. Cells may be
-    /// skipped only if their dimension is below that of the others: a body would have holes without them.
+    /// Returns the mesh, or the reason for its absence; adds notes about skipped and split cells. Cells may
+    /// be skipped only if their dimension is below the largest: a body would have holes without them.
     pub(crate) fn into_mesh(
         self,
         points: Vec<Vector3>,
@@ -244,13 +244,14 @@ impl Cells {
     }
 }
 
-/// How many bytes of arrays a file may fill: files that give a few numbers each for many arrays of the whole
-/// mesh, share bytes between arrays or compress well must not multiply without end.
+/// Largest number of bytes of arrays that a file may fill. Some files give a few numbers each for many arrays
+/// of the whole mesh, share bytes between arrays or compress well. The limit keeps them from multiplying
+/// without end.
 pub(super) fn array_limit(file_size: usize) -> usize {
     file_size.saturating_mul(128).saturating_add(64 << 20)
 }
 
-/// Whether arrays of so many numbers may be filled from a file of that size.
+/// Checks that a file of `file_size` bytes may fill arrays of `numbers` numbers.
 pub(super) fn check_filled(numbers: usize, file_size: usize) -> Result<(), Fault> {
     if numbers.saturating_mul(size_of::<f64>()) <= array_limit(file_size) {
         return Ok(());
@@ -267,7 +268,7 @@ pub(super) fn finite(x: f64, y: f64, z: f64, number: u64, place: Place) -> Resul
     }
 }
 
-/// All points of an array of coordinates, numbered from 0.
+/// Reads the points of an array of coordinates, numbered from 0.
 pub(super) fn finite_points(coordinates: &[f64], place: Place) -> Result<Vec<Vector3>, Fault> {
     index_limit(coordinates.len() / 3, place)?;
     let points = coordinates.chunks_exact(3).enumerate();

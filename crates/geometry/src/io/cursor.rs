@@ -1,5 +1,5 @@
-//! A place that moves through the bytes of a file: words of text, lines, and blocks of binary numbers.
-//! Every count is held against the bytes that are left before anything is allocated.
+//! A reader that moves through the bytes of a file: words of text, lines, and blocks of binary numbers. Every
+//! count is compared with the remaining bytes before anything is allocated.
 
 use std::fmt::{self, Display};
 use std::str::FromStr;
@@ -56,7 +56,7 @@ impl Scalar {
         !matches!(self, Self::F32 | Self::F64)
     }
 
-    /// All numbers in `bytes` as floating point.
+    /// Decodes `bytes` as floating point numbers.
     pub fn decode(self, bytes: &[u8], order: Order) -> Vec<f64> {
         match self {
             Self::I8 => decode!(bytes, order, i8, f64),
@@ -72,7 +72,7 @@ impl Scalar {
         }
     }
 
-    /// All numbers in `bytes` as integers; floating point numbers are cut towards zero.
+    /// Decodes `bytes` as integers; floating point numbers are cut towards zero.
     pub(crate) fn decode_integers(self, bytes: &[u8], order: Order) -> Vec<i64> {
         match self {
             Self::I8 => decode!(bytes, order, i8, i64),
@@ -95,9 +95,9 @@ pub(super) struct Cursor<'a> {
     bytes: &'a [u8],
     at: usize,
     line: usize,
-    /// A binary block was read: lines mean nothing any more, bytes do.
+    /// True after a binary block: positions are then given in bytes, not lines.
     binary: bool,
-    /// The cursor moves in one line only, which is here in the file.
+    /// Place in the file of the only line that the cursor moves in.
     only_line: Option<Place>,
 }
 
@@ -137,7 +137,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// Checks that `count` items of at least `each` bytes fit into the rest (the last one without its
-    /// separator); otherwise returns an error, so nothing is allocated for missing items.
+    /// separator). Otherwise returns an error, so nothing is allocated for missing items.
     pub fn room(&self, count: usize, each: usize, reading: impl Display) -> Result<(), Fault> {
         match count.checked_mul(each) {
             Some(needed) if needed <= self.rest().len() + 1 => Ok(()),

@@ -68,7 +68,7 @@ pub enum MeshFileError {
     Content {
         /// The file.
         path: PathBuf,
-        /// Where in the file.
+        /// Place in the file.
         place: Place,
         /// The problem.
         problem: MeshFileProblem,

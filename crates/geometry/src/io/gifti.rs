@@ -175,7 +175,7 @@ impl<'a> Array<'a, '_> {
         scalar.decode(&bytes, order)
     }
 
-    /// That a transform is given which is not applied.
+    /// Returns a note if the file gives a transform, which is not applied.
     fn transform(&self) -> Option<String> {
         let within = |node: Node<'a, '_>, name| {
             node.children().find(|child| child.has_tag_name(name)).and_then(|child| child.text())

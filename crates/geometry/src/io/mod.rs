@@ -1,10 +1,11 @@
 //! Mesh files in and out.
 //!
-//! Reads Gmsh 1, 2 and 4.1 (`.msh`), legacy VTK (`.vtk`), VTK XML (`.vtu`, `.vtp`), Wavefront OBJ, OFF, STL,
-//! PLY, GIfTI (`.gii`) and FreeSurfer surfaces (`lh.pial`), text and binary; writes `.vtu`, Gmsh 4.1, OBJ,
-//! STL and PLY. The first bytes select the reader if they identify a format, otherwise the extension. Cells
-//! are linear: vertex, line, triangle, quad, tet, hex. Wedges and pyramids become tets (`split.rs`). Cells of
-//! other kinds are an error if the body would lack them, otherwise they are skipped with a note.
+//! Reads Gmsh 1, 2 and 4.1 (`.msh`), legacy VTK (`.vtk`), VTK XML (`.vtu`, `.vtp`), Wavefront OBJ, OFF and
+//! STL. Also reads PLY, GIfTI (`.gii`) and FreeSurfer surfaces (`lh.pial`), text and binary. Writes `.vtu`,
+//! Gmsh 4.1, OBJ, STL and PLY. The first bytes select the reader if they identify a format, otherwise the
+//! extension. Cells are linear: vertex, line, triangle, quad, tet, hex. Wedges and pyramids become tets
+//! (`split.rs`). Cells of other kinds are an error if the body would lack them, otherwise they are skipped
+//! with a note.
 
 mod base64;
 mod cells;
@@ -68,7 +69,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// All formats that can be read.
+    /// The formats that can be read.
     pub const ALL: &[Self] = &[
         Self::Gmsh,
         Self::Vtk,
@@ -125,7 +126,7 @@ impl Format {
         Self::ALL.iter().copied().find(own).or_else(surface)
     }
 
-    /// The format that the ending of a path names, or the first bytes of the file tell.
+    /// Returns the format that the ending of a path names, or else the format of the first bytes of the file.
     pub fn of_file(path: &Path) -> Option<Self> {
         Self::of_path(path).or_else(|| {
             let mut head = Vec::new();
@@ -229,15 +230,14 @@ fn read_of(path: &Path, bytes: &[u8], format: Format) -> Result<MeshFile, MeshFi
     Ok(file)
 }
 
-/// What 3D Slicer writes into the title or the comments of a mesh file whose x runs to the left and y to the
-/// back.
+/// Mark of 3D Slicer in the title or the comments of a mesh file whose x runs to the left and y to the back.
 const LPS: &[u8] = b"SPACE=LPS";
 
 /// Bytes that are searched for it.
 const HEAD: usize = 4096;
 
 impl MeshFile {
-    /// From the axes left, back, head (LPS) to right, front, head (RAS), those of images.
+    /// Turns the mesh from the axes left, back, head (LPS) to right, front, head (RAS), the axes of images.
     fn turn_from_lps(&mut self) {
         self.mesh.transform(&Matrix3::from_diagonal(&Vector3::new(-1.0, -1.0, 1.0)));
         self.notes.push(
@@ -278,8 +278,8 @@ pub fn write(path: &Path, mesh: &Mesh) -> Result<(), MeshFileError> {
     }
 }
 
-/// Writes a file under a temporary name beside it, then renames it: readers find the old file or the new one,
-/// never a part.
+/// Writes a file under a temporary name in the same folder, then renames it. Readers find the old file or the
+/// new one, never a part.
 fn save(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), MeshFileError> {
     let failed = |source| MeshFileError::Write { path: path.to_owned(), source };
     let Some(name) = path.file_name() else {
@@ -297,7 +297,7 @@ fn save(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Re
         fs::rename(&beside, path)
     });
     written.map_err(|error| {
-        // The unfinished file is of no use; the error that led here is the one to tell.
+        // The unfinished file is of no use; the error that led here is the one to report.
         let _ = fs::remove_file(&beside);
         failed(error)
     })
@@ -311,14 +311,14 @@ const UNFINISHED: &str = ".tmp";
 fn unfinished(path: &Path) -> io::Result<fs::File> {
     loop {
         let file = match fs::File::create_new(path) {
-            // Of a killed process that had the same number.
+            // Left by a killed process that had the same number.
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
                 fs::remove_file(path)?;
                 continue;
             }
             made => made?,
         };
-        // A file system without locks has nothing removed from it, either.
+        // Without locks, no unfinished file is removed either.
         let _ = file.lock();
         if path.exists() {
             return Ok(file);
@@ -326,11 +326,11 @@ fn unfinished(path: &Path) -> io::Result<fs::File> {
     }
 }
 
-/// Removes what killed processes left of a file of this name: unfinished files that nobody holds.
+/// Removes unfinished files of this name that no process holds: killed processes left them.
 fn remove_left_over(path: &Path, name: &OsStr) {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let start = format!(".{}.", name.to_string_lossy());
-    // Whatever can't be listed or removed stays; the file itself is written all the same.
+    // Files that can't be listed or removed stay; the file itself is written all the same.
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let found = entry.file_name().to_string_lossy().into_owned();
         let number = found.strip_prefix(&start).and_then(|rest| rest.strip_suffix(UNFINISHED));
@@ -345,7 +345,7 @@ fn remove_left_over(path: &Path, name: &OsStr) {
     }
 }
 
-/// Whether a mesh is whole: finite points, nodes and sets in range, data of the right length.
+/// Checks that a mesh is whole: finite points, nodes and sets in range, data of the right length.
 fn check(path: &Path, mesh: &Mesh) -> Result<(), MeshFileError> {
     match problem(mesh) {
         Some(problem) => Err(MeshFileError::Mesh { path: path.to_owned(), problem }),

@@ -184,7 +184,7 @@ fn joined(mut columns: BTreeMap<String, Vec<f64>>) -> BTreeMap<String, DataArray
 }
 
 impl PlyReader<'_> {
-    /// Whether the items of an element can be there, by the least they take.
+    /// Checks that the items of an element can be there, by their smallest size.
     fn room(&self, element: &PlyElement) -> Result<(), Fault> {
         let each = |property: &Property| match self.encoding {
             PlyEncoding::Text => 2,

@@ -16,11 +16,11 @@ pub fn read_pvd(path: &Path) -> Result<Vec<(f64, PathBuf)>, MeshFileError> {
     parse(path, &fs::read_to_string(path).map_err(unreadable(path))?)
 }
 
-/// The same of a list whose writer may have been stopped: where its end is torn, the frames of its whole
-/// entries.
+/// Reads the list of a series whose writer may have been stopped. If its end is torn, only the frames of
+/// whole entries are returned.
 ///
 /// # Errors
-/// As [`read_pvd`], if more than its end is torn.
+/// The errors of [`read_pvd`], if more than its end is torn.
 pub fn read_torn_pvd(path: &Path) -> Result<Vec<(f64, PathBuf)>, MeshFileError> {
     let bytes = fs::read(path).map_err(unreadable(path))?;
     // A name may be torn within a character.

@@ -23,8 +23,8 @@ pub(super) struct SurfaceOut<'a> {
 }
 
 impl<'a> SurfaceOut<'a> {
-    /// The triangles and quads of a mesh. All points are kept if the mesh has no volume cells, otherwise only
-    /// those of the faces. A mesh without triangles and quads is an error.
+    /// Collects the triangles and quads of a mesh. All points are kept if the mesh has no volume cells,
+    /// otherwise only points of the faces. A mesh without triangles and quads is an error.
     pub fn new(path: &Path, mesh: &'a Mesh) -> Result<Self, MeshFileError> {
         let is_face = |block: &&CellBlock| matches!(block.kind, CellKind::Triangle | CellKind::Quad);
         let blocks: Vec<&CellBlock> =

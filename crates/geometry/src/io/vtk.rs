@@ -10,7 +10,7 @@ use super::vtk_cells::{Connectivity, PolyList, add_grid, add_poly};
 use super::{Format, MeshFile};
 use crate::{DataArray, Vector3};
 
-/// Whose data the attributes are.
+/// Owner of the attributes: points or cells.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Owner {
     Points,
@@ -309,7 +309,7 @@ impl Reader<'_> {
                 self.cursor.line().ok_or_else(|| self.cursor.truncated(&what))?;
                 continue;
             }
-            // The two highest bits of the first byte tell how many bytes hold the length.
+            // The two highest bits of the first byte give the number of bytes of the length.
             let first = self.cursor.take(1, &what)?[0];
             let more = match first >> 6 {
                 3 => 0,

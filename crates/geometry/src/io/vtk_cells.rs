@@ -56,7 +56,7 @@ fn unsupported(number: i64) -> (String, usize) {
 #[derive(Default)]
 pub(super) struct Connectivity {
     pub nodes: Vec<i64>,
-    /// Where each cell ends in `nodes`.
+    /// End of each cell in `nodes`.
     pub ends: Vec<i64>,
 }
 
@@ -119,7 +119,7 @@ impl Connectivity {
     }
 }
 
-/// The kind of polygonal data: which list of a poly-data file the cells are from.
+/// List of a poly-data file that cells are from.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum PolyList {
     Vertices,

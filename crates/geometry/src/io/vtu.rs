@@ -22,7 +22,7 @@ const MOST_INFLATION: usize = 1040;
 
 /// Properties of all arrays of the file.
 struct Storage<'a> {
-    /// Where the lines of the XML end.
+    /// Ends of the lines of the XML.
     line_ends: Vec<usize>,
     order: Order,
     header: Scalar,
@@ -75,8 +75,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
     Ok(file)
 }
 
-/// Cuts appended data, which need not be XML, out of the file: the XML without them, and they with the place
-/// where they begin.
+/// Cuts appended data, which need not be XML, out of the file. Returns the XML without them, and the appended
+/// data with their place.
 fn split_appended(bytes: &[u8]) -> Result<(Bytes<'_>, Option<Appended<'_>>), Fault> {
     const TAG: &[u8] = b"<AppendedData";
     let mut opened = bytes.iter().enumerate().filter(|(_, byte)| **byte == b'<').map(|(at, _)| at);
@@ -530,7 +530,7 @@ impl<'a> Storage<'a> {
         Ok(Cow::Owned(inflated))
     }
 
-    /// The same in base64, where the header of compressed blocks is a separate piece.
+    /// Decodes an array in base64, where the header of compressed blocks is a separate piece.
     fn decode_base64(&mut self, text: &[u8], place: Place, what: &str) -> Result<Bytes<'a>, Fault> {
         let size = self.header.size();
         let mut text = Base64::new(text);

@@ -1,7 +1,7 @@
 //! Writes unstructured grids as VTK's XML (`.vtu`), and the list of the files of a series (`.pvd`).
 //!
 //! Arrays are base64 inside their elements. Appended raw bytes would save a quarter of the size, but are not
-//! XML, and meshio 5.3.5 mixes up the arrays of some of these files.
+//! XML. Also, meshio 5.3.5 mixes up the arrays of some such files.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -17,7 +17,7 @@ use super::vtk_cells::type_number;
 use super::{MeshFileError, base64, check, save};
 use crate::{DataArray, Mesh};
 
-/// How a `.vtu` file is written.
+/// Options of a `.vtu` file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct VtuOptions {
     /// Compresses the arrays with zlib; real numbers that it would hardly shorten are stored in its format as
@@ -36,8 +36,8 @@ const BLOCK: usize = 1 << 17;
 /// times the time.
 const LEVEL: u32 = 1;
 
-/// A block of real numbers is stored as it is where fewer than one in so many of its numbers is met again:
-/// zlib would take a tenth off such fields, and as long as the recovery of stresses.
+/// A block of real numbers is stored uncompressed where fewer than one in this many of its numbers is a
+/// repeat. Zlib would take a tenth off such fields, and as long as the recovery of stresses.
 const REPEATED: usize = 8;
 
 /// Writes a mesh as a `.vtu` file into `writer`, as one piece with all its cells.
@@ -65,8 +65,8 @@ pub fn save_vtu(path: &Path, mesh: &Mesh, options: &VtuOptions) -> Result<(), Me
 pub struct VtuSeries(Option<Lasting>);
 
 impl VtuSeries {
-    /// Writes the next frame into `writer`. Points, cells and sets are those of the first frame, of which
-    /// they are checked.
+    /// Writes the next frame into `writer`. Points, cells and sets are taken from the first frame, and
+    /// checked only there.
     pub fn write(
         &mut self,
         mut writer: impl Write,
@@ -86,7 +86,7 @@ impl VtuSeries {
     }
 }
 
-/// What frames of a mesh have in common, encoded.
+/// Parts that the frames of a mesh share, encoded.
 #[derive(Clone, Debug)]
 struct Lasting {
     point_sets: Vec<u8>,
@@ -153,7 +153,7 @@ impl Parts {
 
     fn array(&mut self, kind: &str, name: &str, components: usize, raw: &[u8]) -> io::Result<()> {
         let name = escaped(name);
-        // Of real numbers some arrays are not worth compressing.
+        // Arrays of real numbers are compressed only where that pays.
         let repeats: fn(&[u8]) -> bool = match kind {
             "Float32" => repeats::<4>,
             "Float64" => repeats::<8>,
@@ -205,7 +205,7 @@ impl Parts {
         }
     }
 
-    /// Indices below `limit`, as narrow as VTK reads them well.
+    /// Writes indices below `limit` in the narrowest type that VTK reads well.
     fn indices(&mut self, name: &str, indices: impl Iterator<Item = usize>, limit: usize) -> io::Result<()> {
         if i32::try_from(limit).is_ok() {
             let raw = bytes(indices.map(|index| (index as i32).to_le_bytes()));
@@ -252,8 +252,8 @@ fn store(bytes: &[u8], to: &mut Vec<u8>) {
     to.extend(adler32(&bytes).to_be_bytes());
 }
 
-/// Whether at least one in [`REPEATED`] numbers of so many bytes was met shortly before in a block, as zlib
-/// needs it to save space.
+/// True if at least one in [`REPEATED`] numbers of `WIDTH` bytes was met shortly before in a block. Otherwise
+/// zlib saves no space.
 fn repeats<const WIDTH: usize>(block: &[u8]) -> bool {
     const SLOTS: usize = 1024;
     let mut seen = [u64::MAX; SLOTS];
@@ -294,8 +294,8 @@ fn write_with(out: &mut dyn Write, mesh: &Mesh, options: &VtuOptions, lasting: &
     out.write_all(&parts.xml)
 }
 
-/// Writes the time, and the names of labels and bodies: for each a text such as `5 liver` as numbers, its
-/// bytes in UTF-8 and a 0. meshio 5.3.5 reads no file that has an array of type `String`.
+/// Writes the time, and the names of labels and bodies. Each name becomes a text such as `5 liver`, stored as
+/// numbers: its bytes in UTF-8 and a 0. Files with an array of type `String` are unreadable for meshio 5.3.5.
 fn write_field_data(parts: &mut Parts, mesh: &Mesh, options: &VtuOptions) -> io::Result<()> {
     let names = [(LABEL_NAMES, &mesh.label_names), (BODY_NAMES, &mesh.body_names)];
     if options.time.is_none() && names.iter().all(|(_, names)| names.is_empty()) {

@@ -1,5 +1,5 @@
-//! XML documents from untrusted files. The time of the reader (roxmltree) grows with the square of the
-//! attributes of an element and of the namespaces, so files with thousands of either are rejected first.
+//! XML documents from untrusted files. The reader (roxmltree) takes time that grows with the square of the
+//! attributes of an element and of the namespaces. So files with thousands of either are rejected first.
 
 use roxmltree::Document;
 

@@ -13,7 +13,7 @@ import vtk
 from vtk.util.numpy_support import numpy_to_vtk
 
 # --- the mixed mesh -----------------------------------------------------------------------------------------
-# A unit cube (hex) with a tet on its top and a triangle, a quad, a line and a vertex on its sides.
+# A unit cube (hex) with tets on its top; triangles, a quad, lines and a vertex on its sides.
 POINTS = np.array(
     [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1], [0.5, 0.25, 2.125]]
 )

@@ -1,5 +1,5 @@
 //! Mesh files in and out: files of other programs (see `data/README.md`), our own round trips, and broken
-//! files, which must give errors and never a panic.
+//! files. Broken files must give errors and never a panic.
 
 mod broken;
 mod written;
@@ -214,7 +214,7 @@ fn gmsh_groups_labels_and_data() {
         let tets = mesh.block(CellKind::Tet).unwrap();
         assert_eq!(tets.len(), 48);
         assert_eq!(tets.sets["all"], (0..48).collect::<Vec<u32>>());
-        // Sets and labels tell the cubes apart as their positions do.
+        // Sets and labels separate the cubes as their positions do.
         for (i, cell) in tets.cells().enumerate() {
             let is_left = cell.iter().all(|&node| mesh.points[node as usize].x <= 1.0);
             let set = if is_left { "left lobe" } else { "right lobe" };
@@ -438,7 +438,7 @@ fn stl_solids_become_sets_and_corners_are_shared() {
     assert!(file.notes[0].contains("1 triangles with two equal corners"));
 }
 
-/// As some programs write them: every ending as two words.
+/// STL of some programs, with every ending as two words.
 #[test]
 fn endings_of_stl_may_be_two_words() {
     let content = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\nend loop\nEnd Facet\n\

@@ -1,4 +1,4 @@
-// Goes on from an instant that was looked at.
+// Continues from an evaluated instant.
 
 @compute @workgroup_size(GROUP)
 fn main(

@@ -1,6 +1,6 @@
-// Forces of bars, twin of forces/bar.rs. Rows at rest: the second node from the first, with the length beside
-// it; how much longer the bar is than without force, E over the length without force, the cross section, and
-// the least stress (0 of a thread).
+// Forces of bars, twin of forces/bar.rs. Rows at rest: the second node from the first, with the length as the
+// fourth number. Then the length less the length without force, E over the length without force, the cross
+// section, and the least stress (0 of a thread).
 
 fn compute(cell: u32) {
     let first = row(0u, cell);

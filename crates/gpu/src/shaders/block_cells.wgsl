@@ -1,4 +1,4 @@
-// A block of neighbouring cells works in shared memory: displacements of its nodes are read once, forces are
+// A block of neighbouring cells works in shared memory. Displacements of its nodes are read once, forces are
 // added up in the order of the cells, and one sum a node is written.
 
 struct Block {
@@ -73,7 +73,7 @@ fn main(
     if index < arrayLength(&blocks) {
         block = blocks[index];
     }
-    // What is read later is asked for at once.
+    // Values that are read later are asked for at once.
     if local < block.cells {
         own_corners.x = corners[block.first_cell + local];
         if CORNERS > 4u {

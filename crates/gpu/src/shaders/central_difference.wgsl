@@ -1,9 +1,9 @@
 // Central differences: the coming increment of a node from the one before; twin of stepper.rs, which has the
 // formulas.
 
-// Of each group: kinetic energy, damping power, internal work before and after; external work before and
-// after, energy of hourglass control, ⅛ Δt⁻² Σ m|a|²; then internal and external work and damping power of
-// all instants that were passed over.
+// Sums of each group: kinetic energy, damping power, internal work before and after. Then external work
+// before and after, energy of hourglass control, ⅛ Δt⁻² Σ m|a|². Last, internal and external work and damping
+// power of all instants that were passed over.
 @group(2) @binding(6) var<storage, read_write> sums: array<vec4f>;
 
 var<workgroup> terms: array<vec4f, GROUP>;

@@ -1,7 +1,7 @@
 // Forces and energies as whole multiples of small ones: in which order they are added does not matter.
 
-// A whole number of at most LIMIT, so that all cells at a node together stay in range; what is cut off is
-// noted.
+// A whole number of at most LIMIT, so that all cells at a node together stay in range. Larger numbers are cut
+// off, and the overflow is noted.
 fn whole(number: f32) -> i32 {
     if !(abs(number) <= LIMIT) {
         atomicMin(&findings[OVERFLOWN], instant.index);

@@ -1,4 +1,4 @@
-// Cells add their forces to those of the nodes, whoever comes first.
+// Cells add their forces to the nodes, whoever comes first.
 
 @group(2) @binding(1) var<storage, read_write> forces: array<atomic<f32>>;
 

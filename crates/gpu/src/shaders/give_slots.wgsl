@@ -1,5 +1,5 @@
-// The force on a follower goes to slots of the nodes that it follows, one for each entry of its row; the
-// energy beside it to the first.
+// The force on a follower goes to slots of the nodes that it follows, one for each entry of its row. The
+// energy in the fourth component goes to the first slot.
 
 @group(1) @binding(0) var<storage, read_write> slots: array<vec4f>;
 @group(1) @binding(4) var<storage, read> slot_offsets: array<u32>;

@@ -1,5 +1,5 @@
-// The force on a follower is added to those on the nodes that it follows; what stays is that along held
-// components, and the energy beside it.
+// The force on a follower is added to the forces on the nodes that it follows. The force along held
+// components stays, and so does the energy in the fourth component.
 
 @group(1) @binding(0) var<storage, read_write> forces: array<atomic<f32>>;
 

@@ -1,5 +1,5 @@
-// The forces of grips, k (p − x) with x = Σ wᵢ (Xᵢ + uᵢ): from p − Σ wᵢ Xᵢ, found in double precision, so
-// that no digits are lost. A group finds that of a grip.
+// The forces of grips, k (p − x) with x = Σ wᵢ (Xᵢ + uᵢ). They follow from p − Σ wᵢ Xᵢ, found in double
+// precision, so that no digits are lost. A group finds the force of one grip.
 
 @group(1) @binding(0) var<storage, read> displacement: array<vec4f>;
 

@@ -1,7 +1,7 @@
-// Forces of uniform-strain hexahedra with hourglass control. Rows at rest: the eight B_a; beside the first
-// four the volume, the stiffness k [N/m] of the control, 3/2 κ² [1/m²] and the shear modulus [Pa] from which
-// k grows; then the four patterns γ at each node. Corners are looked at where the patterns are large enough
-// to invert one; forces/corners.rs of pliant-explicit says why.
+// Forces of uniform-strain hexahedra with hourglass control. Rows at rest: the eight B_a. Their fourth
+// components are, in order, the volume, the stiffness k [N/m] of the control, 3/2 κ² [1/m²] and a shear
+// modulus [Pa]. The stiffness k grows from this modulus. Then the four patterns γ at each node. Corners are
+// looked at where the patterns are large enough to invert one; forces/corners.rs of pliant-explicit says why.
 
 const FIRST_CORNER = 16u;
 

@@ -1,6 +1,6 @@
 // Corners of hexahedra that turn inside out while the cell as a whole does not. Rows at rest from
-// FIRST_CORNER on: X_a − X_0 [m] of all nodes but the first. What is less than round-off inside out is left
-// to the next instants.
+// FIRST_CORNER on: X_a − X_0 [m] of all nodes but the first. An inversion smaller than round-off is left to
+// the next instants.
 
 // Flatness below which a cell is judged by its corners, as in forces/corners.rs.
 const FLAT: f32 = 0.25;

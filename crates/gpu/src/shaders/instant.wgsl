@@ -1,12 +1,12 @@
-// What belongs to one instant of a run; twin of `Instant` in run.rs. Δt⁻ and Δt⁺ are the steps before and
-// after it, h their mean.
+// Values of one instant of a run; twin of `Instant` in run.rs. The steps before and after it are Δt⁻ and Δt⁺,
+// and h is their mean.
 
 struct Instant {
     // Its number since the last one that was looked at.
     index: u32,
     // Where its row of the table begins.
     row: u32,
-    // What is done: MOVES, MEASURES, STARTS.
+    // Actions at the instant: MOVES, MEASURES, STARTS.
     flags: u32,
     // Δt⁻ [s].
     before: f32,
@@ -30,14 +30,14 @@ struct Instant {
     stiffness: f32,
 }
 
-// Goes on to the next instant.
+// Moves to the next instant.
 const MOVES = 1u;
 // Sums up energies and finds how far cells are deformed.
 const MEASURES = 2u;
 // Begins at velocities, which stand in place of the increments.
 const STARTS = 4u;
 
-// Where in `findings` what is found.
+// Entries of `findings`.
 const BROKEN = 0u;
 const OVERFLOWN = 1u;
 const LEAST_VOLUME_RATIO = 2u;
@@ -45,14 +45,14 @@ const LARGEST_STRAIN = 3u;
 const UNLISTED = 4u;
 
 @group(0) @binding(0) var<uniform> instant: Instant;
-// The first instants at which a cell is broken and a sum overflows; bits of the least J and of the
-// largest |C − I|²; the first instant for which candidates for contact are to be listed anew.
+// The first instants at which a cell is broken and a sum overflows. Then bits of the least J and of the
+// largest |C − I|². Last, the first instant for which candidates for contact are to be listed anew.
 @group(0) @binding(1) var<storage, read_write> findings: array<atomic<u32>, 5>;
-// For each instant of a submission the factors of constraints, those of loads, and the gravity of bodies.
+// For each instant of a submission the factors of constraints and of loads, and the gravity of bodies.
 @group(0) @binding(2) var<storage, read> table: array<f32>;
 
-// How many grips and entries there are; of each grip p − Σ wᵢ Xᵢ [m] and its stiffness [N/m]; the force of
-// each [N]; entries in the order of nodes: a node, its weight wᵢ and its grip.
+// Number of grips and of entries. Then p − Σ wᵢ Xᵢ [m] and the stiffness [N/m] of each grip, and the force
+// [N] of each. Then entries in the order of nodes: a node, its weight wᵢ and its grip.
 @group(0) @binding(3) var<storage, read_write> grips: array<vec4f>;
 
 fn grip_count() -> u32 {

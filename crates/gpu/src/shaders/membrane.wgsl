@@ -1,6 +1,6 @@
 // Forces of triangles in plane stress, twin of forces/membrane.rs and plane_stress.rs. Rows at rest: the axes
-// t and s, with the volume and λ + 2μ beside them (0 of an incompressible law); B_1·t, B_1·s, B_2·t, B_2·s;
-// λ/(λ + 2μ).
+// t and s, with the volume and λ + 2μ (0 of an incompressible law) as fourth components; B_1·t, B_1·s, B_2·t,
+// B_2·s; λ/(λ + 2μ).
 
 const MOST_SEARCHES = 40;
 const SEARCHED = 7.6e-6;

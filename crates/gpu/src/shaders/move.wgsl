@@ -22,7 +22,7 @@ fn hold_of(tag: f32) -> u32 {
     return (bitcast<u32>(tag) & ~GRIPPED) - 1u;
 }
 
-// A component of a motion: how far it goes on by the step, or with `then` 1 where it is after it [m].
+// A component of a motion: its increment in the step, or with `then` 1 its value after the step [m].
 fn moved_by(hold: Hold, c: u32, then: u32) -> f32 {
     let at = instant.row + 4u * hold.owner[c] + then;
     return hold.first[c] * table[at] + hold.second[c] * table[at + 2u];

@@ -1,7 +1,7 @@
-// A step in one kernel: a block of neighbouring nodes reads the displacements of all nodes of the cells there
-// into shared memory, finds the forces of these cells, adds up those on its own nodes and moves them, from
-// one side to the other: other blocks still read where they were. Cells at borders are evaluated by several
-// blocks, each with a history of its own.
+// A step in one kernel. A block of neighbouring nodes reads the displacements of all nodes of the cells there
+// into shared memory, and finds the forces of these cells. It adds up the forces on its own nodes and moves
+// these nodes from one side to the other: other blocks still read the old side. Cells at borders are
+// evaluated by several blocks, each with its own history.
 
 struct Block {
     // Its copies of cells.

@@ -1,4 +1,4 @@
-// Impulses of pairs, in the order of their rows: a row is in the level after the last one in which an earlier
+// Impulses of pairs, in the order of their rows. A row is in the level after the last one in which an earlier
 // row has one of its nodes. So rows of a level share no node and are solved at once, with the same bits as
 // one after the other.
 

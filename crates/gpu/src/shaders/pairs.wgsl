@@ -3,11 +3,11 @@
 // A head; four numbers of each contact and its rows; triangles around nodes, by their other corners; nodes
 // with triangles; edges; all candidates.
 @group(2) @binding(16) var<storage, read> candidates: array<u32>;
-// Where each node that touches was when candidates were listed [m], and how far it may go until they are
-// again [m]: negative if it is in none, zero without pairs.
+// Place [m] of each node that touches when candidates were listed, and how far it may go until they are
+// listed again [m]. This distance is negative if the node is in no list, and zero without pairs.
 @group(2) @binding(17) var<storage, read> listed: array<vec4f>;
-// How many pairs are found; the first row of each node that is not placed yet; pairs that are found; those
-// that take part, level by level; where levels end.
+// Number of pairs found; first row of each node that is not placed yet; the pairs found. Then the pairs that
+// take part, level by level, and the ends of levels.
 @group(2) @binding(18) var<storage, read_write> pair_queue: array<atomic<u32>>;
 
 // Places in the head.

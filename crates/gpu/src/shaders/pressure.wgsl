@@ -6,8 +6,8 @@
 @group(1) @binding(1) var<storage, read> corner_offsets: array<u32>;
 // A node and its weight.
 @group(1) @binding(2) var<storage, read> corner_nodes: array<vec2u>;
-// Where corners are at rest, from the first one [m]; beside them pressure [Pa], load, and how many corners
-// there are.
+// Places of corners at rest, from the first one [m]. The fourth components are pressure [Pa], load, and the
+// number of corners.
 @group(1) @binding(3) var<storage, read> corner_rest: array<vec4f>;
 @group(1) @binding(4) var<storage, read_write> corner_forces: array<vec4f>;
 

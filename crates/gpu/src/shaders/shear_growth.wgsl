@@ -7,8 +7,8 @@ struct Growth {
     gradient: Symmetric,
 }
 
-// ε², δ², and half of the difference of F from which a derivative of the stress is taken: the cube root of
-// the spacing of numbers.
+// ε², δ², and half of the difference of F from which a derivative of the stress is taken. This half is the
+// cube root of the spacing of numbers.
 const SMALL_SQUARE = 1e-2;
 const BEND_SQUARE = 1e-2;
 const GROWTH_DIFFERENCE = 4.9215667e-3;

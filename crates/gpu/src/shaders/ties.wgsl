@@ -3,7 +3,7 @@
 @group(1) @binding(1) var<storage, read> followers: array<u32>;
 // First entry of each …
 @group(1) @binding(2) var<storage, read> row_offsets: array<u32>;
-// … in these: bits of the weights along each component, and the followed node.
+// … in the rows: bits of the weights along each component, and the followed node.
 @group(1) @binding(3) var<storage, read> rows: array<vec4u>;
 
 fn weights(entry: u32) -> vec3f {

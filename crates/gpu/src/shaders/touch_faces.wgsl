@@ -33,7 +33,7 @@ fn main(
                 max(distance(places[0], middle), distance(places[1], middle)), distance(places[2], middle),
             );
             let room = touch.offset + way + touch.margin + touch.passage.travel;
-            // No point is nearer than one beside it by more than the way between both.
+            // The distances of two points differ by no more than the distance between the points.
             if near_after(touch.passage, middle - touch.passage.shift).distance <= room + around {
                 let nearest = takes_nearest(touch.passage.thing);
                 let edges = lists[FACE_CONTACTS + 3u * entry + 2u];

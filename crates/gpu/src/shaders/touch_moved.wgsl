@@ -1,5 +1,5 @@
-// Stops at an instant at which nodes are farther from their places in the lists of candidates than these
-// allow: they are made anew before anything happens.
+// Stops at an instant at which nodes are farther from their places in the lists of candidates than the lists
+// allow. The lists are made anew before anything happens.
 
 @compute @workgroup_size(GROUP)
 fn main(

@@ -1,6 +1,7 @@
-// Finds the impulses of all rows, by projected Gauss–Seidel: those of nodes at once, then those on faces of a
-// colour at once, since such faces share no node, then those of pairs. So the order within a colour changes
-// no bit. Then nodes find the sides of things beside them. One group works, since all wait for each other.
+// Finds the impulses of all rows, by projected Gauss–Seidel. Rows of nodes come first, all at once. Rows on
+// faces of a colour follow at once, since such faces share no node. Rows of pairs come last. So the order
+// within a colour changes no bit. Then nodes find the adjacent sides of things. One group works, since all
+// wait for each other.
 
 var<workgroup> change: atomic<u32>;
 var<workgroup> told: u32;

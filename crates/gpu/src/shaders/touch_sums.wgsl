@@ -1,4 +1,4 @@
-// Sums the forces of each contact on its surface [N]: a group finds that of a contact.
+// Sums the forces of each contact on its surface [N], with a group for each contact.
 
 @group(2) @binding(15) var<storage, read_write> sums_of_contacts: array<vec4f>;
 

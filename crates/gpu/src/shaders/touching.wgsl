@@ -2,22 +2,24 @@
 // touching.rs. Ways in the step are kept apart from places, so that gaps and slips lose no digits.
 
 @group(2) @binding(0) var<storage, read> displacement: array<vec4f>;
-// Two of each node that touches: its place at rest [m], as what a number holds and the rest; its number, and
-// its first contact in `lists`.
+// Two vectors for each node that touches. They have its place at rest [m], in single precision and as the
+// remainder. Their fourth components are its number, and its first contact in `lists`.
 @group(2) @binding(8) var<storage, read> surface: array<vec4f>;
 // Rigid things; contacts; weights of the points on faces.
 @group(2) @binding(9) var<storage, read> things: array<f32>;
-// The contacts of nodes; faces; the contacts of faces, with their place in `rows` and their edges; where the
-// faces of each colour begin; places of the forces of each contact.
+// The contacts of nodes; faces; the contacts of faces, with their place in `rows` and their edges. Then the
+// entries where the faces of each colour begin, and the places of the forces of each contact.
 @group(2) @binding(10) var<storage, read> lists: array<u32>;
-// Two of each node that touches: its way [m] without contact, with NEAR and the components that are free;
-// what contacts add to it [m], and by how much a force moves it [m/N].
+// Two vectors for each node that touches. The first has its way [m] without contact, with NEAR and the
+// components that are free. The second has the way [m] that contacts add, and by how much a force moves the
+// node [m/N].
 @group(2) @binding(11) var<storage, read_write> states: array<vec4f>;
-// Of a contact at a node its gap as predicted [m], then the force on it [N]; of one on a face the force and
-// how many of its points take part; then three of each side of the thing at the node, or FACE_ROW of each
-// point of the face: its normal and gap without contact [m]; its slip without contact [m] and its impulse
-// [N]; the force against its slip [N], and whether it takes part; of a point of a face its weights. Then
-// candidates for pairs: the same with their weights.
+// The first vector of a contact at a node has its predicted gap [m], later the force on the node [N]. The
+// first vector of a contact on a face has the force, and the number of its points that take part. Then come
+// three vectors for each side of the thing at the node, or FACE_ROW for each point of the face. Of these
+// three, one has the normal and the gap without contact [m]. The next has the slip without contact [m] and
+// the impulse [N]. The last has the force against the slip [N], and a mark if the row takes part. A point of
+// a face also has its weights. Candidates for pairs come last, with the same vectors and their weights.
 @group(2) @binding(12) var<storage, read_write> rows: array<vec4f>;
 // The force of contacts on each node of the model [N].
 @group(2) @binding(13) var<storage, read_write> contact_forces: array<vec4f>;
@@ -83,7 +85,7 @@ fn first_contact(n: u32) -> u32 {
     return bitcast<u32>(surface[2u * n + 1u].w);
 }
 
-// The place of a node less that of a thing, before the step [m].
+// The place of a node relative to a thing, before the step [m].
 fn place_at(n: u32, passage: Passage) -> vec3f {
     let main = surface[2u * n].xyz - passage.place;
     let rest = surface[2u * n + 1u].xyz - passage.rest_of_place;
@@ -101,8 +103,8 @@ fn mobility_of(n: u32) -> vec3f {
     return states[2u * n + 1u].w * components;
 }
 
-// Writes the row of a point that is predicted to go by `moved` [m] from a place less that of the thing. Its
-// gap [m].
+// Writes the row of a point that is predicted to go by `moved` [m] from a place relative to the thing.
+// Returns its gap [m].
 fn measure(at: u32, touch: Touch, place: vec3f, moved: vec3f, tag: f32) -> f32 {
     let near = meet(touch.passage, touch.offset, place, moved);
     let gap = near.distance - touch.offset;
@@ -112,8 +114,8 @@ fn measure(at: u32, touch: Touch, place: vec3f, moved: vec3f, tag: f32) -> f32 {
     return gap;
 }
 
-// Takes part in finding the deepest gap: depths [m] above zero compare as their bits do, those of -0 would be
-// above all.
+// Takes part in finding the deepest gap. Depths [m] above zero compare as their bits do, but the bits of -0
+// would be above all.
 fn tell_depth(depth: f32) {
     if depth > 0.0 {
         atomicMax(&queue[DEEPEST], bitcast<u32>(depth));
@@ -226,7 +228,7 @@ fn idle(entry: u32) -> u32 {
     return 0u;
 }
 
-// Takes back the impulses of a contact at a node; one of its rows, zero if there are none.
+// Takes back the impulses of a contact at a node. Returns one of its rows, or zero without any.
 fn take_back(n: u32, entry: u32) -> u32 {
     let mobility = mobility_of(n);
     var last = 0u;
@@ -242,8 +244,8 @@ fn take_back(n: u32, entry: u32) -> u32 {
     return last;
 }
 
-// The gap of a node to a thing as it lies now, less what may be left of it [m], and the direction away from
-// the thing.
+// The gap [m] of a node to a thing as the node lies now, without the penetration that may remain. Also the
+// direction away from the thing.
 fn gap_now(n: u32, touch: Touch, place: vec3f) -> Near {
     let goes = states[2u * n].xyz + states[2u * n + 1u].xyz;
     let near = near_after(touch.passage, place + (goes - touch.passage.shift));

@@ -20,7 +20,7 @@ use crate::{Design, Device, GpuError};
 /// The sources of forces, each with its kernels.
 pub(super) struct Forces {
     pub(super) solids: Vec<DeviceSolid>,
-    /// How forces go from cells to nodes.
+    /// Paths of forces from cells to nodes.
     pub(super) paths: Paths,
     loads: Option<DeviceLoads>,
     pub(super) grips: DeviceGrips,
@@ -29,7 +29,7 @@ pub(super) struct Forces {
 }
 
 impl Forces {
-    /// Of a design, with `cut` the blocks of nodes where it has these.
+    /// Makes the forces of a design; `cut` has the blocks of nodes if the design has blocks.
     ///
     /// # Errors
     /// If the device can't take the model.
@@ -84,7 +84,8 @@ impl Forces {
         nodes.kernels(device, &instants.bound, gather, self.loads.as_ref(), contacts, &constants)
     }
 
-    /// What finds the forces at an instant, in order; only those of contacts unless `anew`.
+    /// Returns the kernels that find the forces at an instant, in order; only kernels of contacts unless
+    /// `anew`.
     pub(super) fn kernels(&self, anew: bool) -> impl Iterator<Item = &Kernel> {
         let before = self.contacts.iter().filter_map(|contacts| contacts.before.as_ref());
         let others = anew.then(|| self.without_contact()).into_iter().flatten();

@@ -15,8 +15,8 @@ use crate::run::{Instant, StepFailure, UNLISTED, flags, room};
 use crate::transfer::Four;
 
 impl GpuStepper {
-    /// Takes whole steps without an evaluation; the last submission, which may not be done yet. Where bodies
-    /// touch each other, one number is read back to see whether the device has stopped for lists of
+    /// Takes whole steps without an evaluation. Returns the last submission, which may not be done yet. If
+    /// bodies touch each other, one number is read back to see if the device has stopped for lists of
     /// candidates.
     pub(super) fn go(
         &mut self,
@@ -69,7 +69,7 @@ impl GpuStepper {
         listed
     }
 
-    /// Goes on to a number of whole steps without an evaluation.
+    /// Advances to a number of whole steps without an evaluation.
     fn go_to(
         &mut self,
         state: &mut State<f32>,
@@ -157,8 +157,7 @@ impl GpuStepper {
         }
     }
 
-    /// Goes on from the instants that are pushed, at first with a side; the first of them may be an evaluated
-    /// one.
+    /// Submits the instants that are pushed, beginning at a side; the first instant may be an evaluated one.
     fn submit_steps(&mut self, from_evaluated: bool, mut side: usize) -> wgpu::SubmissionIndex {
         let Self { forces, kernels, .. } = self;
         let follow = forces.ties.as_ref().map(|ties| &ties.follow);

@@ -32,8 +32,8 @@ use crate::transfer::{Four, Transfer};
 use crate::{Design, Device, GpuError};
 
 /// Steps a state of one model by one step size, in single precision, on a device. The current state is on the
-/// device: of the state that is passed in, a call changes the clock, the energies, the record of the critical
-/// time step, and what it is asked to read back.
+/// device. Of the state that is passed in, a call changes the clock, the energies and the record of the
+/// critical time step. Other parts change only if the call reads them back.
 ///
 /// The first state that is passed in is uploaded; [`upload`](Self::upload) uploads another one.
 pub struct GpuStepper {
@@ -44,7 +44,7 @@ pub struct GpuStepper {
     control: StepControl,
     /// Lengths of the steps before and after the last evaluated instant.
     lengths: Lengths,
-    /// Whether the highest modes are dissipated.
+    /// True if the highest modes are dissipated.
     dissipates: bool,
     balance_floor: f64,
     forces: Forces,
@@ -210,12 +210,12 @@ impl GpuStepper {
         state.stability.damping_factors(self.dissipates, self.model.stiffness_damping, before)
     }
 
-    /// How another stepper goes on from a state of this one.
+    /// Returns the clock with which another stepper continues from a state of this one.
     pub fn clock(&self, state: &State<f32>) -> pliant_explicit::Clock {
         self.control.clock(state)
     }
 
-    /// Goes on where another stepper, with steps of length `step` [s], has stood at a state: with the
+    /// Continues from a state where another stepper, with steps of length `step` [s], has stood, with the
     /// velocities there.
     pub fn go_on(&mut self, clock: &pliant_explicit::Clock, step: f64, state: &State<f32>) {
         self.control.go_on(clock, step, state);
@@ -231,7 +231,7 @@ impl GpuStepper {
         self.balance_floor
     }
 
-    /// How forces come from cells to nodes.
+    /// Returns the design, the path of forces from cells to nodes.
     pub fn design(&self) -> Design {
         self.design
     }
@@ -262,11 +262,11 @@ impl GpuStepper {
         self.instants.forget(&self.device);
     }
 
-    /// Forces, coming increments, reactions and energies at the state's instant.
+    /// Finds forces, coming increments, reactions and energies at the state's instant.
     ///
     /// # Errors
-    /// If the state is not finite, a cell is inverted, the energies do not balance, the step is above the
-    /// limit and must not be cut, or the device fails.
+    /// If the state is not finite, a cell is inverted, or the energies do not balance. Also if the step is
+    /// above the limit and must not be cut, or the device fails.
     pub fn evaluate(&mut self, state: &mut State<f32>, wanted: Wanted) -> Result<(), StepFailure> {
         self.evaluated(state)?;
         if wanted == Wanted::Everything {
@@ -335,10 +335,10 @@ impl GpuStepper {
         StepError::unbalanced(&self.model, fastest, energies.balance, state.time).into()
     }
 
-    /// Goes `steps` whole steps on; an instant that is not evaluated yet is so first.
+    /// Advances by `steps` whole steps; an instant that is not evaluated yet is evaluated first.
     ///
     /// # Errors
-    /// As [`Self::evaluate`], at any of them; the state then stands at the instant of the error.
+    /// See [`Self::evaluate`], at any of the instants; the state then stands at the instant of the error.
     pub fn advance(&mut self, state: &mut State<f32>, steps: u64) -> Result<(), StepFailure> {
         let mut left = steps;
         while left > 0 {
@@ -351,9 +351,9 @@ impl GpuStepper {
         Ok(())
     }
 
-    /// Goes up to `steps` whole steps on, as many as take about `within`, and waits for them without any
-    /// read-back, unless bodies touch each other. Returns how many. After a failure the device stops, and the
-    /// next evaluation reports it. The first instant is evaluated where that is not done yet.
+    /// Advances by up to `steps` whole steps, as many as take about `within`, and waits for them. Nothing is
+    /// read back, unless bodies touch each other. Returns the number of steps. After a failure the device
+    /// stops, and the next evaluation reports it. The first instant is evaluated if it is not evaluated yet.
     ///
     /// # Errors
     /// As [`Self::evaluate`] at the first instant, and if the device fails.
@@ -378,8 +378,7 @@ impl GpuStepper {
         Ok(steps)
     }
 
-    /// Takes hold of points: these grips and no others act from the next evaluation on. Their work is
-    /// external.
+    /// Replaces the grips: only these act from the next evaluation on. Their work is external.
     ///
     /// # Errors
     /// If there are too many for the device.
@@ -391,8 +390,8 @@ impl GpuStepper {
         self.instants.grip(&self.device, &numbers)
     }
 
-    /// What finds points on the device that are combinations of nodes, from their places at rest [m] and the
-    /// nodes and weights of each.
+    /// Makes the kernel that finds points on the device as combinations of nodes. `points` has their places
+    /// at rest [m] and the nodes and weights of each.
     ///
     /// # Errors
     /// If there are too many for the device.

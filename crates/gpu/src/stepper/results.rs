@@ -1,4 +1,4 @@
-//! What a device found at an instant.
+//! Findings of a device at an instant.
 
 use pliant_explicit::recover::stored_at_start;
 use pliant_explicit::{Deformed, State, Sums};
@@ -164,7 +164,7 @@ pub(super) struct Readings {
     pub(super) contact_forces: Vec<Four>,
     /// Increment [m] of each node after the last instant that was read back whole.
     pub(super) next: Vec<Vector<f32>>,
-    /// Of each constraint, the places of its nodes among those held, and the components it owns.
+    /// Places of the nodes of each constraint among the held nodes, and the components it owns.
     owned: Vec<Vec<(u32, [bool; 3])>>,
 }
 
@@ -196,7 +196,7 @@ impl Readings {
     }
 }
 
-/// For each constraint the places in `held` of its nodes, and the components it owns.
+/// Returns for each constraint the places of its nodes in `held`, and the components it owns.
 fn owned(model: &Model, owners: &[[u32; 3]], held: &[u32]) -> Vec<Vec<(u32, [bool; 3])>> {
     let of_node = |index: u32, node: u32| {
         let owns = owners[node as usize].map(|owner| owner == index);

@@ -1,4 +1,4 @@
-//! Where the state on a device stands, and how far it may go before the next evaluation.
+//! Stage of the state on a device, and steps it may take before the next evaluation.
 
 use pliant_explicit::stability::Stability;
 use pliant_explicit::{Deformed, State, StepControl};
@@ -9,7 +9,7 @@ const EVALUATE_EVERY: u64 = 100;
 /// Evaluations are more frequent where the deformation changes by more than this factor from one to the next.
 const CALM: f64 = 1.02;
 
-/// Where the state on the device stands.
+/// Stage of the state on the device.
 #[expect(clippy::large_enum_variant, reason = "a stepper has one")]
 pub(super) enum Stage {
     /// No state was uploaded.
@@ -60,14 +60,14 @@ pub(super) struct Progress {
     stability: Stability,
     /// Number of instants after the evaluated one.
     pub(super) instants: u32,
-    /// Whether the state's energies contain the work of these instants. Then the present instant must be
-    /// evaluated before further steps: the device adds to the same sums until an evaluation, so this work
+    /// True if the state's energies contain the work of these instants. Then the present instant must be
+    /// evaluated before further steps. The device adds to the same sums until an evaluation, so this work
     /// would be entered twice.
     pub(super) entered: bool,
 }
 
 impl Progress {
-    /// Begins at a state that was just evaluated, its arrays on a side.
+    /// Makes the progress at a state that was just evaluated, its arrays on a side.
     pub(super) fn new(state: &State<f32>, side: usize) -> Self {
         let State { steps, time, stability, .. } = *state;
         Self { side, steps, time, stability, instants: 0, entered: false }
@@ -99,9 +99,9 @@ impl Progress {
     }
 }
 
-/// How many whole steps may pass until the next evaluation.
+/// Number of whole steps that may pass until the next evaluation.
 pub(super) struct Interval {
-    /// How far cells were deformed at the last evaluation.
+    /// Deformation of the cells at the last evaluation.
     pub(super) deformed: Deformed,
     /// Steps until the energies must be known.
     stride: u64,

@@ -89,8 +89,8 @@ fn off(model: &Assembly, one: &State, other: &State) -> f64 {
 
 const BOTH: [Preconditioner; 2] = [Preconditioner::BlockJacobi, Preconditioner::Aggregates];
 
-/// A solution to 1e-9, far below single precision, is that of factors in double precision: the error of a
-/// displacement is larger than the residual by the condition of the matrix, here 1e3 at most.
+/// A solution to 1e-9, far below single precision, agrees with factors in double precision. The error of a
+/// displacement exceeds the residual by the condition of the matrix, here 1e3 at most.
 #[test]
 fn corrections_in_single_precision_add_up_to_a_solution_in_double_precision() {
     let Some(device) = support::device() else { return };
@@ -127,7 +127,7 @@ fn a_pulsing_tube_moves_as_on_the_cpu() {
     }
 }
 
-/// With Newton's method both come to the same states, to the tolerance of a step.
+/// Newton's method comes to the same states with both, to the tolerance of a step.
 #[test]
 fn newtons_method_converges_to_the_states_of_the_cpu() {
     let Some(device) = support::device() else { return };
@@ -304,7 +304,7 @@ fn chain(solver: &mut dyn DeviceSolver, nodes: u32) -> Vec<f32> {
 }
 
 /// A solver that had a larger and a smaller matrix before, and a pattern that found no room, gives the bits
-/// of a fresh one; in the middle of a chain x = 1/2.
+/// of a fresh one. In the middle of a chain x = 1/2.
 #[test]
 fn another_pattern_leaves_nothing_behind() {
     let Some(device) = support::device() else { return };
@@ -328,8 +328,8 @@ fn another_pattern_leaves_nothing_behind() {
     assert_eq!(chain(&mut *reused, 40), chain(&mut *device.solver().unwrap(), 40));
 }
 
-/// Six hundred loose pieces of four nodes, each held at one of them, under their weight: their aggregates are
-/// limited, and their solution to 1e-9 is that of factors.
+/// Six hundred loose pieces of four nodes, each held at one node, under their weight. Their aggregates are
+/// limited, and their solution to 1e-9 agrees with factors.
 #[test]
 fn many_loose_pieces_are_solved_with_few_aggregates() {
     let Some(device) = support::device() else { return };

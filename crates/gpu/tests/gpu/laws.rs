@@ -1,10 +1,10 @@
-//! Every law in WGSL against its Rust twin in double precision, which is held beside the twin in single
-//! precision.
+//! Every law in WGSL against its Rust twin in double precision. The twin in single precision is compared,
+//! too.
 //!
-//! An error is measured in the Frobenius norm, part by part, relative to |S| + M |H| with the part's modulus
-//! at rest M (longitudinal modulus without κ; κ): strains are sums of terms of the size of H, each rounded.
-//! So small strains without rotation count relative to their own stress, those under a large rotation to what
-//! the rotation leaves of their digits.
+//! An error is measured in the Frobenius norm, part by part, relative to |S| + M |H|. Here M is the part's
+//! modulus at rest (longitudinal modulus without κ; κ). Strains are sums of terms of the size of H, each
+//! rounded. So small strains without rotation count relative to their own stress. Strains under a large
+//! rotation count relative to the digits that the rotation leaves.
 
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use pliant_gpu::Device;
@@ -194,8 +194,8 @@ fn largest(errors: impl Iterator<Item = f64>) -> f64 {
     errors.fold(0.0, f64::max)
 }
 
-/// The error of the two parts, each relative to its scale; infinite where what is found is not finite. None
-/// beyond the limit of a law that locks.
+/// The error of the two parts, each relative to its scale; infinite if a result is not finite. None beyond
+/// the limit of a law that locks.
 fn errors(law: &AnyLaw, sample: &Sample, found: &[Symmetric<f32>; 2]) -> [f64; 2] {
     let fibres = sample.fibres.map(|a| a.map(f64::from));
     let exact = law.stress(&sample.deformation(), &fibres[..law.families()]);
@@ -249,7 +249,7 @@ fn stresses_follow_double_precision_as_closely_as_single_precision_does() {
     }
 }
 
-/// What the expression is at every one of the given numbers, `x`.
+/// Returns the expression at every one of the given numbers, `x`.
 fn values(device: &Device, law: &AnyLaw, expression: &str, given: &[f32]) -> Vec<f32> {
     let shader = law.shader().unwrap();
     let invocation = format!("let x = given[index];\n        results[index] = {expression};");
@@ -320,7 +320,7 @@ fn products_and_cofactors_of_gradients_are_those_of_tensors() {
         let [[a, b, c], [d, e, g]] = sample.fibres.map(|a| a.map(f64::from));
         let exact = [f.times_symmetric(&Symmetric([a, b, c, d, e, g])), f.cofactor()];
         for (k, exact) in exact.iter().flat_map(|t| t.0.as_flattened()).enumerate() {
-            // Sums of three products of numbers up to 1.6, or of two of them, of a gradient rounded once.
+            // Sums of three products of numbers up to 1.6, or two such sums, of a gradient rounded once.
             assert!((f64::from(found[k]) - exact).abs() < 10.0 * EPSILON, "component {k} of {:?}", sample.h);
         }
     }

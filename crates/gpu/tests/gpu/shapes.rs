@@ -16,7 +16,7 @@ use crate::support;
 
 const POINTS: usize = 2000;
 
-/// Of each point what `near_after` and `meet` find, and the way of the thing there.
+/// Results of `near_after` and `meet` at each point, and the way of the thing there.
 const MAIN: &str = "
 @group(0) @binding(0) var<storage, read> thing_numbers: array<f32>;
 @group(0) @binding(1) var<storage, read> passage_numbers: array<f32>;
@@ -113,7 +113,7 @@ fn shapes_and_ways_follow_double_precision() {
     }
 }
 
-/// Of each number its root, and its sine.
+/// Root and sine of each number.
 const ROOT_AND_SINE: &str = "
 @group(0) @binding(0) var<storage, read> given: array<f32>;
 @group(0) @binding(1) var<storage, read_write> found: array<f32>;
@@ -136,7 +136,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 }
 ";
 
-/// To single precision, however small: devices need not find them so.
+/// Roots and sines are right to single precision, however small: devices need not find them so.
 #[test]
 fn roots_and_sines_keep_their_relative_digits() {
     let Some(device) = support::device() else { return };

@@ -100,9 +100,9 @@ fn patch() -> (Assembly, State) {
     (model, state)
 }
 
-/// The states after steps on the device, read back after each of `parts`, and on the CPU; the work on the
-/// device [J] with the rest of its last step, and that on the CPU, by the trapezoidal rule over all steps.
-/// Some nodes are pushed [N].
+/// Returns the states after steps on the device, read back after each of `parts`, and on the CPU. Also
+/// returns the work on the device [J] with the rest of its last step. The work on the CPU follows from the
+/// trapezoidal rule over all steps. Some nodes are pushed [N].
 fn both(
     device: &Device,
     model: &Assembly,
@@ -163,7 +163,7 @@ fn off(model: &Assembly, [one, other]: &[State; 2]) -> [f64; 2] {
     ]
 }
 
-/// After 200 steps places, rotations and the work of forces from outside differ by 1e-5 at most, the
+/// Places, rotations and the work of forces from outside differ by 1e-5 at most after 200 steps, the
 /// round-off of single precision.
 #[test]
 fn shells_move_as_on_the_cpu() {

@@ -16,7 +16,7 @@ pub fn device() -> Option<Device> {
     }
 }
 
-/// The triangles of a sheet with so many cells along its axes; points are numbered along the first.
+/// Returns the triangles of a sheet with `counts` cells along its axes; points are numbered along the first.
 pub fn triangles(sheet: Sheet, counts: [usize; 2], pattern: Pattern) -> Mesh {
     sheet.mesh(counts, pattern, None, DEFAULT_CELL_LIMIT).unwrap()
 }

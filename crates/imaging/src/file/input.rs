@@ -14,10 +14,10 @@ use crate::image::{Numbers, Order, Scalar};
 /// Longest header of a text format; NRRD's of 3D Slicer list every segment.
 const HEADER_LIMIT: u64 = 1 << 22;
 
-/// Voxels are read in pieces of so many bytes, with progress reported after each.
+/// Bytes of the pieces in which voxels are read, with progress reported after each.
 const PIECE: u64 = 1 << 24;
 
-/// A place that moves through the bytes of a file.
+/// Reader of the bytes of a file.
 pub(super) struct Input<'a> {
     bytes: Box<dyn BufRead + 'a>,
     /// The file, where its neighbours may be read.
@@ -31,7 +31,7 @@ pub(super) struct Input<'a> {
     header_left: u64,
     /// Bytes that voxels may take.
     limit: u64,
-    /// Hears which part of the voxels is read.
+    /// Receives the part of the voxels that is read.
     progress: &'a dyn Fn(f64),
 }
 
@@ -64,7 +64,7 @@ impl<'a> Input<'a> {
         }
     }
 
-    /// From now on neighbours are read in this folder only.
+    /// Restricts the reading of other files to this folder.
     pub(crate) fn stay_within(&mut self, folder: Option<PathBuf>) {
         self.within = folder;
     }
@@ -75,18 +75,18 @@ impl<'a> Input<'a> {
         Input { bytes: Box::new(&mut self.bytes), path, within, progress, ..*self }
     }
 
-    /// What follows, packed with gzip.
+    /// Unpacks the rest with gzip.
     pub(crate) fn unpack_gzip(self) -> Self {
         Self { bytes: Box::new(BufReader::new(MultiGzDecoder::new(self.bytes))), packed: true, ..self }
     }
 
-    /// What follows, packed with zlib.
+    /// Unpacks the rest with zlib.
     pub(crate) fn unpack_zlib(self) -> Self {
         Self { bytes: Box::new(BufReader::new(ZlibDecoder::new(self.bytes))), packed: true, ..self }
     }
 
-    /// The file of this name beside this one, from its start, compressed or not. It starts with voxels, which
-    /// may look like anything.
+    /// Opens the file of this name in the same folder, from its start, compressed or not. It starts with
+    /// voxels, which may look like anything.
     pub fn beside(&self, field: &'static str, name: &str) -> Result<Input<'a>, Fault> {
         let Some(path) = &self.path else {
             return Err(ImageProblem::Unsupported {
@@ -201,7 +201,7 @@ impl<'a> Input<'a> {
         Ok(Numbers { scalar, order, bytes })
     }
 
-    /// Bytes of so many numbers, if that many may be read.
+    /// Bytes of `count` numbers, if the limit allows them.
     pub(crate) fn within_limit(&self, count: usize, scalar: Scalar) -> Result<u64, ImageProblem> {
         let (bytes, limit) = (count as u64 * scalar.size() as u64, self.limit);
         if bytes > limit { Err(ImageProblem::TooManyBytes { bytes, limit }) } else { Ok(bytes) }

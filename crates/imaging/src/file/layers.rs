@@ -1,5 +1,6 @@
-//! Segmentations of 3D Slicer in layers (`.seg.nrrd` with a first axis of layers): several label images of
-//! the same voxels, in which segments may overlap and use a value again. They become one label image.
+//! Segmentations of 3D Slicer in layers (`.seg.nrrd` with a first axis of layers). The layers are label
+//! images of the same voxels, in which segments may overlap and use a value again. They become one label
+//! image.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,8 +15,8 @@ pub(super) struct Segment {
     name: String,
 }
 
-/// The segments of a header in the order of their numbers: `Segment0_LabelValue:=5` beside
-/// `Segment0_Layer:=1` and `Segment0_Name:=liver`. One without a value is left out.
+/// The segments of a header in the order of their numbers: `Segment0_LabelValue:=5` with `Segment0_Layer:=1`
+/// and `Segment0_Name:=liver`. Segments without a value are left out.
 pub(super) fn segments(pairs: &[(String, String)]) -> Vec<Segment> {
     let mut found: BTreeMap<u32, (Segment, bool)> = BTreeMap::new();
     for (key, value) in pairs {

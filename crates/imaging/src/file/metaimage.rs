@@ -1,7 +1,7 @@
-//! MetaImage: a text header, `Key = Value`, that ends with `ElementDataFile`: the voxels follow (`.mha`) or
-//! lie in a file beside it (`.mhd`). Each triple of `TransformMatrix` is the direction of an axis; world
-//! coordinates are LPS [mm] (ITK's MetaImageIO). Leaves out: several values a voxel, several volumes, data
-//! spread over several files, text data.
+//! MetaImage: a text header, `Key = Value`, that ends with `ElementDataFile`. The voxels follow (`.mha`) or
+//! lie in a file of the same folder (`.mhd`). Each triple of `TransformMatrix` is the direction of an axis;
+//! world coordinates are LPS [mm] (ITK's MetaImageIO). Leaves out: several values a voxel, several volumes,
+//! data spread over several files, text data.
 
 use nalgebra::Matrix3;
 use pliant_geometry::Grid;
@@ -192,7 +192,7 @@ impl MetaImageHeader {
             .map_err(|flat| ImageProblem::from(flat).at_line(line))
     }
 
-    /// Metres a unit of length.
+    /// Metres per unit of length.
     fn unit(&self) -> Result<f64, Fault> {
         match self.get("DistanceUnits").map(|field| (field, field.value.as_str())) {
             None | Some((_, "mm" | "?" | "")) => Ok(1e-3),
@@ -203,7 +203,7 @@ impl MetaImageHeader {
         }
     }
 
-    /// Where the voxels begin, unpacked.
+    /// Returns the voxels from their start, unpacked.
     fn data<'i>(&self, input: &'i mut Input<'_>) -> Result<Input<'i>, Fault> {
         let file = self.need(DATA)?;
         let local = file.value.eq_ignore_ascii_case("local");

@@ -76,7 +76,7 @@ impl ImageFormat {
         }
     }
 
-    /// The format that the first bytes (unpacked) tell.
+    /// The format of the first bytes (unpacked).
     fn of_bytes(head: &[u8]) -> Option<Self> {
         if head.starts_with(b"NRRD") {
             Some(Self::Nrrd)
@@ -99,7 +99,7 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Image, ImageError> {
     read_with(path, options, &|_| {})
 }
 
-/// The same; `progress` hears fractions from 0 to 1.
+/// Reads an image file, or the DICOM series of a folder. `progress` hears fractions from 0 to 1.
 pub fn read_with(path: &Path, options: &ReadOptions, progress: &dyn Fn(f64)) -> Result<Image, ImageError> {
     if path.is_dir() {
         return dicom::read_folder(path, options, progress);
@@ -145,7 +145,7 @@ impl Fault {
     }
 }
 
-/// Refuses a file that really lies outside a folder.
+/// Rejects a file that lies outside a folder, with links resolved.
 fn check_within(path: &Path, folder: Option<&Path>) -> io::Result<()> {
     match folder {
         Some(folder) if !path.canonicalize()?.starts_with(folder) => {

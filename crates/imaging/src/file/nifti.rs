@@ -23,7 +23,7 @@ const HEADER: [usize; 2] = [348, 540];
 const POSITIVE: &str =
     "spacings must be positive and finite; correct pixdim (e.g. with fslorient or nibabel)";
 
-/// Whether the first bytes belong to NIfTI, in either byte order.
+/// True if the first bytes belong to NIfTI, in either byte order.
 pub(super) fn has_magic(head: &[u8]) -> bool {
     let magic =
         |at: usize, words: [&[u8]; 2]| words.iter().any(|word| head.get(at..at + word.len()) == Some(word));
@@ -240,7 +240,7 @@ impl NiftiHeader {
         }
     }
 
-    /// Metres a unit of length; unknown units are taken as millimetres.
+    /// Metres per unit of length; unknown units are taken as millimetres.
     fn unit(&self, notes: &mut Vec<String>) -> f64 {
         let code = if self.version == 1 { self.bytes[123].into() } else { self.integer(0, 500, 4) };
         match code & 7 {

@@ -1,8 +1,8 @@
-//! NRRD: a text header, `field: value`, that ends at an empty line or with the file (detached header), then
-//! the voxels (Teem's definition of the format, NRRD0001 to NRRD0005). An axis of one element without
-//! direction is dropped. The names of labels are those that 3D Slicer writes: `Segment0_Name:=liver` beside
-//! `Segment0_LabelValue:=5`. A first axis of layers of segments becomes one image. Leaves out: several values
-//! a voxel otherwise, encodings hex and bzip2, data spread over several files.
+//! NRRD: a text header, `field: value`, then the voxels (Teem's definition of the format, NRRD0001 to
+//! NRRD0005). The header ends at an empty line or with the file (detached header). An axis of one element
+//! without direction is dropped. Names of labels are read as 3D Slicer writes them: `Segment0_Name:=liver`
+//! with `Segment0_LabelValue:=5`. A first axis of layers of segments becomes one image. Leaves out: several
+//! values a voxel otherwise, encodings hex and bzip2, data spread over several files.
 
 use std::collections::BTreeMap;
 

@@ -10,7 +10,7 @@ fn error(bytes: &[u8], format: ImageFormat) -> String {
     read_bytes(bytes, format, &ReadOptions::default()).expect_err("the image is bad").to_string()
 }
 
-/// What an error of a NIfTI file says after some bytes of a good one are replaced.
+/// Returns the error of a NIfTI file after some bytes of a good one are replaced.
 fn nifti_with(at: usize, bytes: &[u8]) -> String {
     let mut file = nifti1(&Volume::oblique(), Form::Qform, false);
     file[at..at + bytes.len()].copy_from_slice(bytes);

@@ -53,7 +53,7 @@ fn the_surface_of_a_ball_is_found_to_a_fraction_of_a_voxel() {
     }
 }
 
-/// The shift makes the enclosed volume equal to that of the voxels.
+/// The shift makes the enclosed volume equal to the volume of the voxels.
 #[test]
 fn the_volume_is_that_of_the_voxels() {
     let image = ball(Matrix3::identity() * 1e-3);

@@ -1,4 +1,4 @@
-//! The same volume in every format: the same voxels in the same places.
+//! One volume in every format: the same voxels in the same places.
 
 use std::fs;
 
@@ -7,8 +7,8 @@ use pliant_imaging::{Image, ImageFormat, ReadOptions, Scalar, read, read_bytes};
 
 use pliant_testing::image_files::*;
 
-/// The voxels of `image` equal those of `volume`, each at its position to `tolerance` [m]. Axes may be
-/// reversed (slices are sorted), so voxels are found by position.
+/// Asserts that the voxels of `image` equal the voxels of `volume`, each at its position to `tolerance` [m].
+/// Axes may be reversed (slices are sorted), so voxels are found by position.
 fn assert_same(image: &Image, volume: &Volume, tolerance: f64) {
     assert_eq!(image.grid.len(), volume.values.len());
     for at in 0..image.grid.len() {

@@ -25,7 +25,7 @@ fn labelled() -> Volume {
     Volume { dims, values: (0..120).map(label).collect(), ..Volume::oblique() }
 }
 
-/// The voxels with labels equal those of a volume, in position.
+/// Asserts that the voxels with labels equal the voxels of a volume, in position.
 fn assert_same(image: &Image, volume: &Volume) {
     let inverse = volume.axes.try_inverse().unwrap();
     let mut found = 0;
@@ -129,9 +129,9 @@ fn names_stand_in_the_headers_of_nrrd_and_nifti() {
     }
 }
 
-/// Labels that a program stored as scaled integers are half a step of the scale off at most; those that it
-/// interpolated between equal ones a little. Both are rounded, with a note; what lies between labels is no
-/// label.
+/// Labels that a program stored as scaled integers are half a step of the scale off at most. Labels that a
+/// program interpolated between equal ones are a little off. Both are rounded, with a note; a value between
+/// labels is no label.
 #[test]
 fn labels_off_by_their_storage_are_rounded() {
     let (slope, intercept) = (0.216_296_65_f32, 7087.5_f32);
@@ -164,7 +164,8 @@ fn labels_off_by_their_storage_are_rounded() {
     assert_eq!(of([0.0, 1.0, 2.0, 3.0]).rounding(), None);
 }
 
-/// The box of a ball in an oblique image is that of its voxels, not that of the corners of its box of voxels.
+/// The box of a ball in an oblique image is the box of its voxels. The box of the corners of its voxel range
+/// is larger.
 #[test]
 fn boxes_of_oblique_labels_are_true() {
     let dims = [24, 20, 16];
@@ -363,7 +364,7 @@ fn pipes_and_devices_are_refused_and_not_waited_for() {
     }
 }
 
-/// Images of more than 16 MB are told how far reading and cutting are, from nothing to the end and never
+/// While images of more than 16 MB are read and cut, progress is reported, from nothing to the end and never
 /// back.
 #[test]
 fn reading_and_cutting_a_large_image_tell_how_far_they_are() {
@@ -388,7 +389,7 @@ fn reading_and_cutting_a_large_image_tell_how_far_they_are() {
     assert_eq!(cut.labels.grid.dims, [60, 260, 60]);
 }
 
-/// 760³ labels of one byte are 0.44 GB; reading them from a gzip file and cutting a body out takes half as
+/// 760³ labels of one byte are 0.44 GB. Reading them from a gzip file and cutting a body out takes half as
 /// much again at most.
 #[test]
 #[ignore = "half a GB of memory and ten seconds"]

@@ -4,12 +4,12 @@
 use super::Rest;
 use crate::tensor::{Vector, add, dot, scale, sub};
 
-/// How bars pull.
+/// Slack and compression behaviour of bars.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cord {
     /// Length without force over the length at rest: above 1 hangs through, below 1 pulls from the start.
     pub slack: f64,
-    /// Whether it takes no compression, as a thread.
+    /// True if the bar takes no compression, as a thread.
     pub tension_only: bool,
 }
 
@@ -20,7 +20,7 @@ impl Default for Cord {
     }
 }
 
-/// What a bar does in a state.
+/// Stretch and stress of a bar in a state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pull {
     /// Length over that without force, λ.
@@ -59,8 +59,8 @@ impl Rest<2> {
 }
 
 impl Cord {
-    /// What a bar of Young's modulus `young` [Pa] does whose second node has moved by `moved` [m] relative to
-    /// the first. The change of length is found without cancellation.
+    /// Returns the pull of a bar of Young's modulus `young` [Pa] whose second node has moved by `moved` [m]
+    /// relative to the first. The change of length is found without cancellation.
     pub fn pull(&self, rest: &Rest<2>, moved: Vector<f64>, young: f64) -> Pull {
         let (before, from) = (rest.between(), rest.length());
         let now = add(before, moved);

@@ -1,7 +1,7 @@
 //! The uniform-strain hexahedron of Flanagan and Belytschko (1981) in total-Lagrangian form (Joldes, Wittek
-//! and Miller 2008): mean gradients and exact volume by 2×2×2 Gauss points (the centroid gradient fails the
-//! patch test), and stiffness against the four hourglass patterns, scaled by the shear modulus so that it
-//! does not lock.
+//! and Miller 2008). It has mean gradients and the exact volume by 2×2×2 Gauss points; the centroid gradient
+//! fails the patch test. A stiffness acts against the four hourglass patterns. The shear modulus scales this
+//! stiffness, so that the element does not lock.
 
 use super::Rest;
 use crate::tensor::{Vector, add, dot, scale, sub};
@@ -22,10 +22,10 @@ pub const HEX_CORNERS: [[f64; 3]; 8] = [
 pub const HEX_EDGES: [[usize; 3]; 8] =
     [[1, 3, 4], [2, 0, 5], [3, 1, 6], [0, 2, 7], [7, 5, 0], [4, 6, 1], [5, 7, 2], [6, 4, 3]];
 
-/// Flatness below which a hexahedron is judged by its corners: its volume over that at rest, of a
-/// uniform-strain one over √(1 + |C − I|²/2) too, about its least stretch. At glued edges, where stresses
-/// grow without end, corners fold at moderate strains, the more the finer the mesh, while forces stay those
-/// of other codes (the reference cubes at 20 and 30 %).
+/// Flatness below which a hexahedron is judged by its corners: its volume over the volume at rest. For a
+/// uniform-strain hexahedron it is also divided by √(1 + |C − I|²/2), which is about its least stretch. At
+/// glued edges stresses grow without end, and corners fold at moderate strains, the more the finer the mesh.
+/// Forces still agree with other codes (the reference cubes at 20 and 30 %).
 pub const FLAT_HEX: f64 = 0.25;
 
 /// A hexahedron at rest.
@@ -74,9 +74,9 @@ pub fn hex8(x: &[Vector<f64>; 8]) -> Hex8 {
     }
 }
 
-/// κ². ∂N_a/∂X at a corner less the mean one gives zero for linear fields, so that it is Σ_c γ_ca W_c; κ
-/// bounds the norm of every W, whose largest eigenvalue of WᵀW is at most the mean of all and √2 times their
-/// scatter.
+/// Returns κ². At a corner ∂N_a/∂X less its mean gives zero for linear fields. This difference is therefore
+/// Σ_c γ_ca W_c, and κ bounds the norm of every W. The largest eigenvalue of WᵀW is at most the mean of all
+/// and √2 times their scatter.
 fn corner_reach(corners: &[[Vector<f64>; 8]; 8], mean: &[Vector<f64>; 8], hourglass: &[[f64; 8]; 4]) -> f64 {
     let gamma = nalgebra::SMatrix::<f64, 4, 8>::from_fn(|c, a| hourglass[c][a]);
     let inverse = (gamma * gamma.transpose()).try_inverse();

@@ -6,7 +6,7 @@ use crate::tensor::{Vector, cross, dot, scale, sub};
 /// Two unit vectors at right angles in the plane of a triangle at rest: the frame in which its law works.
 pub type Axes = [Vector<f64>; 2];
 
-/// What a triangle of a membrane has beside its gradients and volume.
+/// Properties of a triangle of a membrane in addition to its gradients and volume.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sheet {
     /// The frame of the triangle at rest, its first axis along the first edge.
@@ -16,7 +16,7 @@ pub struct Sheet {
 }
 
 /// The rest quantities of a triangle from its nodes [m] and its thickness [m]. Gradients are in the plane of
-/// the triangle; the volume is that of the wall.
+/// the triangle; the volume is the volume of the wall.
 pub fn membrane(x: &[Vector<f64>; 3], thickness: f64) -> (Rest<3>, Sheet) {
     let [a, b] = [sub(x[1], x[0]), sub(x[2], x[0])];
     let normal = cross(a, b);

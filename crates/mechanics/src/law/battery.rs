@@ -7,7 +7,7 @@ use super::*;
 use crate::tensor::{Tensor, dot, scale};
 
 const FIBRE: [f64; 3] = [0.6, 0.0, 0.8];
-/// As many as any law has families; the second at right angles.
+/// Directions of as many families as any law has; the second at right angles.
 const FIBRES: [[f64; 3]; 2] = [FIBRE, [0.0, 1.0, 0.0]];
 
 /// Displacement gradients with det F > 0: shear, stretch, compression, general.
@@ -209,8 +209,8 @@ fn volumetric_stress_is_a_pressure_that_knows_only_the_volume() {
     }
 }
 
-/// ρc² at rest of a wave along `n` that moves along `m`: m·(dP n)/ds for H = s m⊗n, the larger of s → +0 and
-/// s → −0 (fibres that carry tension only know the difference).
+/// ρc² at rest of a wave along `n` that moves along `m`: m·(dP n)/ds for H = s m⊗n. The result is the larger
+/// value of s → +0 and s → −0. Only fibres that carry tension alone have different values.
 fn wave_stiffness(law: &AnyLaw, n: [f64; 3], m: [f64; 3]) -> f64 {
     let force = |s: f64| {
         let mut h = Tensor::ZERO;

@@ -39,7 +39,7 @@ pub(super) fn shear_at_rest(key: &'static str, shear: f64, formula: &str) -> Res
     Err(ParameterError { key, message, help: "otherwise the solid is not stable at rest".into() })
 }
 
-/// How far axes may be from unit length and from right angles.
+/// Tolerance of axes for unit length and right angles.
 const AXES_TOLERANCE: f64 = 1e-6;
 
 /// Three unit directions at right angles, one per row.

@@ -1,8 +1,9 @@
 //! Co-rotated linear law: Ψ = μ |F − R|² + λ/2 tr²(U − I), with F = R U the polar decomposition (McAdams et
-//! al. 2011, ACM TOG 30:37). Of the principal stretches it is μ Σ (λᵢ − 1)² + λ/2 (Σ λᵢ − 3)²: linear
+//! al. 2011, ACM TOG 30:37). In principal stretches Ψ = μ Σ (λᵢ − 1)² + λ/2 (Σ λᵢ − 3)². This is linear
 //! elasticity in a frame that turns with the material, for small strains under large rotations. Softer in
-//! compression than tissue; its energy stays finite at J → 0. S = Σ (2μ (λᵢ − 1) + λ tr(U − I))/λᵢ Nᵢ⊗Nᵢ;
-//! with β a principal value of C − I, λ − 1 = β/(1 + √(1 + β)) keeps the digits of small strains.
+//! compression than tissue; its energy stays finite at J → 0. The stress is S = Σ (2μ (λᵢ − 1) + λ tr(U −
+//! I))/λᵢ Nᵢ⊗Nᵢ. With β a principal value of C − I, λ − 1 = β/(1 + √(1 + β)) keeps the digits of small
+//! strains.
 
 use schemars::JsonSchema;
 use serde::Deserialize;

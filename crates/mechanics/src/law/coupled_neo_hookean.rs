@@ -1,5 +1,5 @@
-//! Coupled neo-Hookean law (thesis 5.9): Ψ = μ/2 (I₁ − 3 − 2 ln J) + λ/2 (J − 1)².
-//! Equal to the split law to first order only (λ = κ − 2μ/3): name the law beside every number.
+//! Coupled neo-Hookean law (thesis 5.9): Ψ = μ/2 (I₁ − 3 − 2 ln J) + λ/2 (J − 1)². Equal to the split law to
+//! first order only (λ = κ − 2μ/3): name the law with every number.
 
 use schemars::JsonSchema;
 use serde::Deserialize;

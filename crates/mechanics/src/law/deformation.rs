@@ -1,12 +1,13 @@
-//! What the laws need of a deformation, computed from the displacement gradient H = F − I so that small
-//! strains keep their digits in single precision: J − 1 = tr H + II(H) + det H, C − I = H + Hᵀ + Hᵀ H.
+//! Measures of a deformation for the laws. They are computed from the displacement gradient H = F − I, so
+//! that small strains keep their digits in single precision. J − 1 = tr H + II(H) + det H, C − I = H + Hᵀ +
+//! Hᵀ H.
 //!
-//! A bar is the isochoric measure: C̄ = q C, q = J^(−2/3); Ī₁ = tr C̄, Ī₂ = ½ (Ī₁² − tr C̄²), Ī₄ = a·C̄a,
-//! Ī₅ = a·C̄²a. An energy Ψ(Ī₁, Ī₂, Ī₄, Ī₅) with the derivatives Wₖ = ∂Ψ/∂Īₖ has the stress S = q (Φ − ⅓
-//! (Φ:C) C⁻¹) with Φ = 2 (W₁ + Ī₁ W₂) I − 2 W₂ C̄ + 2 W₄ a⊗a + 2 W₅ (a⊗C̄a + C̄a⊗a). Here it is put together
+//! A bar marks an isochoric measure: C̄ = q C, q = J^(−2/3); Ī₁ = tr C̄, Ī₂ = ½ (Ī₁² − tr C̄²), Ī₄ = a·C̄a,
+//! Ī₅ = a·C̄²a. Let an energy Ψ(Ī₁, Ī₂, Ī₄, Ī₅) have the derivatives Wₖ = ∂Ψ/∂Īₖ. Its stress is S = q (Φ − ⅓
+//! (Φ:C) C⁻¹). Here Φ = 2 (W₁ + Ī₁ W₂) I − 2 W₂ C̄ + 2 W₄ a⊗a + 2 W₅ (a⊗C̄a + C̄a⊗a). The stress is computed
 //! from terms that vanish at rest: the isotropic part is C⁻¹ dev M with M a polynomial of X = C − I. By E =
-//! I − C⁻¹ it is C⁻¹ X = E and C⁻¹ X² = X − E, so that no tensors are multiplied. E itself is ((J² − 1 − tr
-//! X) I + X − cof X)/J², as cof C = (1 + tr X) I − X + cof X.
+//! I − C⁻¹, C⁻¹ X = E and C⁻¹ X² = X − E, so that no tensors are multiplied. E itself is ((J² − 1 − tr X) I +
+//! X − cof X)/J², as cof C = (1 + tr X) I − X + cof X.
 
 use crate::Number;
 use crate::tensor::{Symmetric, Tensor, Vector, dot};
@@ -33,8 +34,8 @@ pub struct Deformation<R> {
 }
 
 impl<R: Number> Deformation<R> {
-    /// From the displacement gradient H = ∂u/∂X. J ≤ 0 is the caller's to report: the measures are then
-    /// meaningless.
+    /// Computes the measures from the displacement gradient H = ∂u/∂X. The caller must report J ≤ 0: the
+    /// measures are then meaningless.
     #[inline(always)]
     pub fn from_displacement_gradient(h: &Tensor<R>) -> Self {
         let mut gradient = *h;
@@ -139,7 +140,8 @@ impl<R: Number> Deformation<R> {
         direction * (R::of(2.0) * w4 * self.isochoric_factor)
     }
 
-    /// S of an energy of Ī₄ and Ī₅ of the unit fibre `a`: that of Ī₄ and 2 W₅ q² (a⊗Ca + Ca⊗a − ⅔ |Ca|² C⁻¹).
+    /// Stress S of an energy of Ī₄ and Ī₅ of the unit fibre `a`: the stress of Ī₄ and 2 W₅ q² (a⊗Ca + Ca⊗a −
+    /// ⅔ |Ca|² C⁻¹).
     #[inline(always)]
     pub(crate) fn fibre_stresses(&self, a: Vector<R>, [w4, w5]: [R; 2]) -> Symmetric<R> {
         let (q, x) = (self.isochoric_factor, self.strain_twice.apply(a));

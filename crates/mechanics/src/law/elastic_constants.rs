@@ -1,4 +1,4 @@
-//! The two moduli of an isotropic matrix, given either as shear and bulk modulus or as Young's modulus and
+//! The two moduli of an isotropic matrix. They are given as shear and bulk modulus, or as Young's modulus and
 //! Poisson's ratio: μ = E/(2(1+ν)), κ = E/(3(1−2ν)).
 
 use schemars::JsonSchema;
@@ -73,7 +73,7 @@ impl ElasticConstants {
         }
     }
 
-    /// The same of a law that must be able to change its volume.
+    /// Returns the moduli of a law that must be able to change its volume.
     ///
     /// # Errors
     /// As [`moduli`](Self::moduli), and if ν = ½.
@@ -102,7 +102,7 @@ impl ElasticConstants {
     }
 }
 
-/// What is wrong with a Poisson's ratio out of range.
+/// Message for a Poisson's ratio out of range.
 pub(super) fn poisson_range(nu: f64) -> String {
     format!("`poisson-ratio` must be above −1 and at most 0.5; found {nu}")
 }

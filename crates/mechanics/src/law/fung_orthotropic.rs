@@ -1,8 +1,8 @@
-//! Orthotropic exponential law of Fung (1979): Ψ = c/2 (e^Q − 1) + U(J), Q = d·Dd + Σ sₘ (2Eₘ)², with d =
-//! (E₁₁, E₂₂, E₃₃) and m the shears 12, 23, 13 of the Green–Lagrange strain E in the material axes. S = c e^Q
-//! ½ ∂Q/∂E + S_vol. Not split: E is the whole strain, so that the exponential resists a change of volume too.
-//! Strains of a few tens of percent stiffen it by orders of magnitude; the exponential overflows to infinity,
-//! which stops a run with an error.
+//! Orthotropic exponential law of Fung (1979): Ψ = c/2 (e^Q − 1) + U(J), Q = d·Dd + Σ sₘ (2Eₘ)². Here d =
+//! (E₁₁, E₂₂, E₃₃), and m are the shears 12, 23, 13 of the Green–Lagrange strain E in the material axes. The
+//! stress is S = c e^Q ½ ∂Q/∂E + S_vol. The law is not split: E is the whole strain, so that the exponential
+//! resists a change of volume too. Strains of a few tens of percent stiffen it by orders of magnitude. The
+//! exponential overflows to infinity, which stops a run with an error.
 
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -47,7 +47,7 @@ pub(crate) struct FungOrthotropicParameters {
     /// Modulus κ of the volumetric energy U(J) [Pa]; the exponential adds to the bulk modulus.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub bulk_modulus: f64,
-    /// How the energy U grows with the change of volume.
+    /// Form of the energy U(J) of a change of volume.
     #[serde(default)]
     pub volumetric: VolumetricEnergy,
 }
@@ -155,8 +155,8 @@ impl Law for FungOrthotropic {
         Some(self.volumetric.shader(&[include_str!("fung_orthotropic.wgsl")], &own))
     }
 
-    /// The shear modulus is the largest over all shears at rest, the bulk modulus that of a pure dilation.
-    /// It has axes, though no fibres that differ from cell to cell.
+    /// The shear modulus is the largest over all shears at rest, and the bulk modulus belongs to a pure
+    /// dilation. The law has axes, though no fibres that differ from cell to cell.
     fn is_isotropic(&self) -> bool {
         false
     }
@@ -175,8 +175,8 @@ impl Law for FungOrthotropic {
     }
 
     fn longitudinal_modulus(&self) -> f64 {
-        // c d·Dd + c Σ s (2E)² for a strain sym(n⊗m) of norm 1 at most: the largest principal value of the
-        // form, in which a shear counts √2 E.
+        // c d·Dd + c Σ s (2E)² for a strain sym(n⊗m) of norm 1 at most. The largest principal value of the
+        // form bounds this term. A shear counts √2 E in the form.
         let normal = largest(principal(&self.normal).0);
         self.volumetric.bulk + self.modulus * normal.max(2.0 * largest(self.shear))
     }

@@ -1,6 +1,6 @@
 //! Gent law (Gent 1996): Ψ = −μ Jₘ/2 ln(1 − (Ī₁ − 3)/Jₘ) + U(J), W₁ = μ/2 · Jₘ/(Jₘ − (Ī₁ − 3)). The tissue
 //! locks at Ī₁ − 3 = Jₘ. There and beyond, energy and stress are infinite or not a number, never a finite
-//! number of the wrong sign: a run that gets there stops with an error.
+//! number of the wrong sign. A run that gets there stops with an error.
 
 use schemars::JsonSchema;
 use serde::Deserialize;

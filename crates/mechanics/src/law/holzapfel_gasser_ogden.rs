@@ -1,8 +1,9 @@
 //! Arterial wall of Holzapfel, Gasser and Ogden (2000) with dispersed fibres (Gasser, Ogden and Holzapfel
-//! 2006): Ψ = c/2 (Ī₁ − 3) + Σ k₁/(2k₂) (e^(k₂ ⟨E⟩²) − 1) + U(J) over one or two families, E = κ (Ī₁ − 3) +
-//! (1 − 3κ)(Ī₄ − 1), κ between 0 (aligned) and 1/3 (isotropic). Fibres carry tension only (E > 0), as a
-//! maximum instead of a branch. With p = k₁ E e^(k₂ E²): W₁ = c/2 + Σ κ p, W₄ = (1 − 3κ) p. The stiffness
-//! jumps where E changes sign; the exponential stiffens far beyond the bound at rest: watch the step.
+//! 2006). The energy is Ψ = c/2 (Ī₁ − 3) + Σ k₁/(2k₂) (e^(k₂ ⟨E⟩²) − 1) + U(J) over one or two families. Here
+//! E = κ (Ī₁ − 3) + (1 − 3κ)(Ī₄ − 1), with κ between 0 (aligned) and 1/3 (isotropic). Fibres carry tension
+//! only (E > 0), as a maximum instead of a branch. With p = k₁ E e^(k₂ E²) this gives W₁ = c/2 + Σ κ p, W₄ =
+//! (1 − 3κ) p. The stiffness jumps where E changes sign. The exponential stiffens far beyond the bound at
+//! rest: watch the step.
 
 use schemars::JsonSchema;
 use serde::Deserialize;

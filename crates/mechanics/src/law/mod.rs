@@ -1,10 +1,10 @@
 //! Constitutive laws: energy and second Piola–Kirchhoff stress from the deformation gradient.
 //!
-//! A law is a small struct of parameters, its methods generic over the number type, so that the same lines
-//! run as reference and as fast path. Most laws are a sum of an isochoric and a volumetric energy and
+//! A law is a small struct of parameters. Its methods are generic over the number type, so that the same
+//! lines run as reference and as fast path. Most laws are a sum of an isochoric and a volumetric energy and
 //! implement [`SplitLaw`], the others [`Law`] itself. The history of viscoelasticity wraps a law (see
-//! [`prony`](crate::prony)); it is not a law of its own. To add a law: its file and that of its WGSL twin
-//! here, its line in the registry below, its line in the samples that tests run.
+//! [`prony`](crate::prony)) and is no law. A new law needs its file and its WGSL twin here. It also needs a
+//! line in the registry below, and a line in the samples that tests run.
 
 mod arruda_boyce;
 mod check;
@@ -105,21 +105,21 @@ impl SmallStrainModuli {
     }
 }
 
-/// What is wrong with a parameter of a law.
+/// Error in a parameter of a law.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{message}")]
 pub struct ParameterError {
     /// The key at fault, as in a scene file.
     pub key: &'static str,
-    /// What is wrong, with the number.
+    /// The error, with the number.
     pub message: String,
-    /// What to do about it.
+    /// Remedy.
     pub help: String,
 }
 
 /// A law that a scene can name.
 pub(crate) trait NamedLaw: Law {
-    /// What a user gives, each parameter with unit and range.
+    /// Parameters from the user, each with unit and range.
     type Parameters: DeserializeOwned + JsonSchema;
 
     /// Checks and converts the user's parameters.
@@ -141,14 +141,15 @@ pub trait Law: Copy + Send + Sync + 'static {
     /// Second Piola–Kirchhoff stress [Pa].
     fn stress<R: Number>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> Split<Symmetric<R>>;
 
-    /// The whole of it.
+    /// Returns the whole stress.
     #[inline(always)]
     fn whole_stress<R: Number>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> Symmetric<R> {
         let Split { isochoric, volumetric } = self.stress(deformation, fibres);
         isochoric + volumetric
     }
 
-    /// The stress in WGSL, its text in the file beside the law's; `None` of a law for the CPU only.
+    /// Returns the stress in WGSL, whose text is in the file next to the law's; `None` for a law for the CPU
+    /// only.
     fn shader(&self) -> Option<Shader>;
 
     /// Families of fibres, each with a direction in every cell.
@@ -156,12 +157,12 @@ pub trait Law: Copy + Send + Sync + 'static {
         0
     }
 
-    /// Whether the law is the same in all directions.
+    /// True if the law is the same in all directions.
     fn is_isotropic(&self) -> bool {
         self.families() == 0
     }
 
-    /// Whether the shear stiffness never rises above that at rest, as [`ShearGrowth`] measures it.
+    /// True if the shear stiffness never rises above the stiffness at rest, as [`ShearGrowth`] measures it.
     fn keeps_shear_stiffness(&self) -> bool {
         false
     }
@@ -169,9 +170,9 @@ pub trait Law: Copy + Send + Sync + 'static {
     /// Moduli at rest, without the fibres; of a law without isotropic matrix the largest shear modulus.
     fn small_strain(&self) -> SmallStrainModuli;
 
-    /// An upper bound of ρc² over all directions at rest [Pa]: λ + 2μ, plus what fibres add. With it the
-    /// element bound of the critical step is rigorous: by Cauchy and Schwarz the nuclear norm of Σ v_a⊗B_a is
-    /// at most |v| |B|, and a positive form is largest over that ball at some n⊗m.
+    /// An upper bound of ρc² over all directions at rest [Pa]: λ + 2μ, plus the part of fibres. With this
+    /// bound the element bound of the critical step is rigorous. By Cauchy and Schwarz the nuclear norm of Σ
+    /// v_a⊗B_a is at most |v| |B|. A positive form is largest over that ball at some n⊗m.
     fn longitudinal_modulus(&self) -> f64 {
         let SmallStrainModuli { shear, bulk } = self.small_strain();
         bulk + 4.0 / 3.0 * shear + self.fibre_modulus()
@@ -224,7 +225,7 @@ macro_rules! registry {
                 }
             }
 
-            /// The name in a scene file, or that of one's own law.
+            /// Name in a scene file, or name of a user's [own law](OwnLaw).
             pub fn name(&self) -> &'static str {
                 match self { $(Self::$law(_) => $name,)* Self::Own(own) => own.name() }
             }
@@ -315,12 +316,12 @@ impl AnyLaw {
         with_law!(self, law => Law::families(law))
     }
 
-    /// Whether the law is the same in all directions.
+    /// True if the law is the same in all directions.
     pub fn is_isotropic(&self) -> bool {
         with_law!(self, law => Law::is_isotropic(law))
     }
 
-    /// Whether the shear stiffness never rises; see [`Law::keeps_shear_stiffness`].
+    /// True if the shear stiffness never rises; see [`Law::keeps_shear_stiffness`].
     pub(crate) fn keeps_shear_stiffness(&self) -> bool {
         with_law!(self, law => Law::keeps_shear_stiffness(law))
     }
@@ -335,7 +336,7 @@ impl AnyLaw {
         with_law!(self, law => law.longitudinal_modulus())
     }
 
-    /// What fibres add to ρc² at rest at most [Pa]; see [`Law::fibre_modulus`].
+    /// Upper bound of the part of fibres in ρc² at rest [Pa]; see [`Law::fibre_modulus`].
     pub(crate) fn fibre_modulus(&self) -> f64 {
         with_law!(self, law => law.fibre_modulus())
     }
@@ -362,7 +363,7 @@ impl AnyLaw {
     }
 }
 
-/// The same stretch in all directions that has a J − 1.
+/// Returns the equal stretch in all directions that has a J − 1.
 fn dilation(change: f64) -> Deformation<f64> {
     let c = (1.0 + change).cbrt();
     let (stretch, o) = (change / (c * c + c + 1.0), 0.0);

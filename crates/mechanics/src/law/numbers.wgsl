@@ -1,8 +1,8 @@
-// Functions of one number to a few units in the last place, relative ones near zero too: WGSL asks little of
-// its own `log` and `exp`. What is not a number stays so.
+// Functions of one number to a few units in the last place, with relative accuracy near zero too: WGSL
+// requires little of its `log` and `exp`. NaN stays NaN.
 
-// x^(−1/3) of a positive number, meaningless for others: minus a third of the exponent as first guess (4 %
-// off), then two steps along the series of (1 − e)^(−1/3), e = 1 − x y³, without a division.
+// x^(−1/3) of a positive number, meaningless for others. The first guess is minus a third of the exponent (4
+// % off). Two steps follow along the series of (1 − e)^(−1/3), e = 1 − x y³, without a division.
 fn inverse_cbrt(x: f32) -> f32 {
     var y = bitcast<f32>(0x54a2fa8cu - bitcast<u32>(x) / 3u);
     for (var step = 0; step < 2; step++) {
@@ -19,7 +19,7 @@ fn cbrt(x: f32) -> f32 {
 }
 
 // ln(1 + x), meaningless for x ≤ −1. With 1 + x = 2ᵏ (1 + f) and s = f/(2 + f): ln(1 + f) = f − f²/2 + s
-// (f²/2 + R(s²)), the coefficients of R from logf of FreeBSD's msun.
+// (f²/2 + R(s²)). The coefficients of R are from logf of FreeBSD's msun.
 fn ln_1p(x: f32) -> f32 {
     var f = x;
     var k = 0.0;
@@ -37,8 +37,8 @@ fn ln_1p(x: f32) -> f32 {
     return fma(k, 0.6931472, f - (half_square - s * (half_square + r)));
 }
 
-// 2ⁿ and eʳ − 1 with x = n ln 2 + r, |r| ≤ ln 2/2, so that eˣ = 2ⁿ eʳ. Beyond x = 88.3 2ⁿ is infinite. What
-// is not a number stays so: a compiler may make a maximum of the bound from below, which loses it.
+// 2ⁿ and eʳ − 1 with x = n ln 2 + r, |r| ≤ ln 2/2, so that eˣ = 2ⁿ eʳ. Beyond x = 88.3 2ⁿ is infinite. NaN is
+// returned as NaN: a compiler may turn the lower bound into a maximum, which loses NaN.
 fn power_and_rest(x: f32) -> vec2f {
     if (bitcast<u32>(x) & 0x7fffffffu) > 0x7f800000u {
         return vec2f(x);

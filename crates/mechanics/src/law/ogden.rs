@@ -1,8 +1,8 @@
 //! Ogden law (1972): Ψ = Σₚ 2μₚ/αₚ² (λ̄₁^αₚ + λ̄₂^αₚ + λ̄₃^αₚ − 3) + U(J), isochoric principal stretches λ̄ᵢ;
-//! μ = Σ μₚ at rest. The Kirchhoff stress has the principal values tᵢ = Σₚ 2μₚ/αₚ λ̄ᵢ^αₚ minus their mean,
-//! and S = Σᵢ tᵢ/λᵢ² Nᵢ⊗Nᵢ: no difference of stretches is divided by, so that equal stretches need no care.
-//! With β = λ̄² − 1, a principal value of C̄ − I: λ̄^α − 1 = e^(α/2 ln(1+β)) − 1 keeps the digits of small
-//! strains.
+//! μ = Σ μₚ at rest. The Kirchhoff stress has the principal values tᵢ = Σₚ 2μₚ/αₚ λ̄ᵢ^αₚ minus their mean.
+//! The stress is S = Σᵢ tᵢ/λᵢ² Nᵢ⊗Nᵢ. The law never divides by a difference of stretches, so that equal
+//! stretches are no special case. Let β = λ̄² − 1 be a principal value of C̄ − I. Then λ̄^α − 1 = e^(α/2
+//! ln(1+β)) − 1 keeps the digits of small strains.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

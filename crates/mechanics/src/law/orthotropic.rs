@@ -1,6 +1,6 @@
-//! Orthotropic law, two families of fibres: Ψ = μ/2 (Ī₁ − 3) + ½ Σ eₖ (Īₖ − 1)², k = 4 … 7, + U(J); Ī₄, Ī₅ of
-//! the first family a, Ī₆, Ī₇ of the second b. Fibres resist compression as well as tension. The axes of
-//! orthotropy are those of a and b if these are at right angles. Leaves out: the coupling invariant a·C̄b.
+//! Orthotropic law, two families of fibres: Ψ = μ/2 (Ī₁ − 3) + ½ Σ eₖ (Īₖ − 1)², k = 4 … 7, + U(J). Here Ī₄,
+//! Ī₅ belong to the first family a, and Ī₆, Ī₇ to the second b. Fibres resist compression as well as tension.
+//! The axes of orthotropy are a and b if these are at right angles. Leaves out: the coupling invariant a·C̄b.
 
 use schemars::JsonSchema;
 use serde::Deserialize;

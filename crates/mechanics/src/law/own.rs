@@ -62,7 +62,7 @@ pub trait OwnLaw: fmt::Debug + Send + Sync + 'static {
         0
     }
 
-    /// Whether the volumetric stress is J U′(J) C⁻¹; elements that average pressures refuse other laws.
+    /// True if the volumetric stress is J U′(J) C⁻¹; elements that average pressures refuse other laws.
     fn has_volumetric_energy(&self) -> bool {
         false
     }
@@ -75,12 +75,12 @@ pub trait OwnLaw: fmt::Debug + Send + Sync + 'static {
     }
 }
 
-/// A law of one's own among the others.
+/// A user's law among the others.
 #[derive(Clone, Copy)]
 pub struct Own(&'static dyn OwnLaw);
 
 impl AnyLaw {
-    /// A law of one's own. It stays in memory as long as the program runs.
+    /// Makes a law of a user's law. It stays in memory as long as the program runs.
     pub fn own(law: impl OwnLaw) -> Self {
         Self::Own(Own(Box::leak(Box::new(law))))
     }

@@ -1,11 +1,10 @@
-//! Laws in plane stress, for thin walls: the stretch λ₃ across the wall is the one at which the stress across
-//! it vanishes.
+//! Laws in plane stress, for thin walls: with the stretch λ₃ across the wall the stress across vanishes.
 //!
 //! In the frame of a wall C is known but for C₃₃ = λ₃². A law sees F = R with Rᵀ R = C, R upper triangular
-//! (Cholesky), which differs from the true F by a rotation that no law feels. λ₃ makes the Kirchhoff stress
-//! across, λ₃² S₃₃, zero: a secant search over ln λ₃ that starts with λ + 2μ as slope. An incompressible law
-//! has λ₃ = 1/√det C in the plane, and a pressure that takes S₃₃ away, without a search (Holzapfel,
-//! *Nonlinear Solid Mechanics*, 6.3). So every law of the registry has its plane-stress version.
+//! (Cholesky). This R differs from the true F by a rotation, which does not affect the stress. λ₃ makes the
+//! Kirchhoff stress across, λ₃² S₃₃, zero. A secant search over ln λ₃ finds it, with λ + 2μ as first slope.
+//! An incompressible law has λ₃ = 1/√det C in the plane. Its pressure cancels S₃₃ without a search
+//! (Holzapfel, *Nonlinear Solid Mechanics*, 6.3). So every law of the registry has its plane-stress version.
 
 use super::tangent::{DIFFERENCE, by_differences};
 use super::{AnyLaw, Deformation, SmallStrainModuli, Split};
@@ -27,7 +26,7 @@ pub struct InPlane<R> {
 }
 
 impl<R: Number> InPlane<R> {
-    /// From C₁₁ − 1, C₂₂ − 1 and C₁₂. Not a number where the wall is folded flat.
+    /// Makes the strain from C₁₁ − 1, C₂₂ − 1 and C₁₂. Not a number where the wall is folded flat.
     #[inline(always)]
     pub(crate) fn from_strain_twice(strain_twice: [R; 3]) -> Self {
         // √(1 + x) − 1 = x/(1 + √(1 + x)), without cancellation. Written out: closures are not compiled for
@@ -87,8 +86,9 @@ impl<R: Number> InPlane<R> {
         -change / (R::ONE + change)
     }
 
-    /// S₁₁, S₂₂ and S₁₂ without the stress across: S − w λ₃² S₃₃ C⁻¹. With w = 1 that is what the pressure of
-    /// an incompressible law does; with w = λ/(λ + 2μ) it takes off what the search for λ₃ has left over.
+    /// S₁₁, S₂₂ and S₁₂ without the stress across: S − w λ₃² S₃₃ C⁻¹. With w = 1 this is the effect of the
+    /// pressure of an incompressible law. With w = λ/(λ + 2μ) it removes the stress that the search for λ₃
+    /// has left.
     #[inline(always)]
     pub fn without_stress_across(&self, stress: &Symmetric<R>, thickness_change: R, w: R) -> [R; 3] {
         let [xx, yy, xy] = self.strain_twice;
@@ -114,7 +114,7 @@ pub fn kirchhoff_across<R: Number>(stress: &Symmetric<R>, thickness_change: R) -
 pub struct Across {
     /// λ + 2μ [Pa]; infinite of an incompressible law.
     pub modulus: f64,
-    /// λ/(λ + 2μ), by how much a wall thins when its area grows; 1 of an incompressible law.
+    /// λ/(λ + 2μ), the ratio of thinning to growth of area of a wall; 1 for an incompressible law.
     pub coupling: f64,
 }
 
@@ -127,7 +127,7 @@ pub struct ThicknessSearch<R> {
     slope: R,
     /// τ [Pa] of the last step.
     last: R,
-    /// By how much ln λ₃ changed in it.
+    /// Last change of ln λ₃.
     moved: R,
 }
 
@@ -195,7 +195,7 @@ pub struct PlaneStress {
 }
 
 impl AnyLaw {
-    /// Whether the law keeps the volume (ν = ½), which walls in plane stress alone can do.
+    /// True if the law keeps the volume (ν = ½); only walls in plane stress can do this.
     pub fn is_incompressible(&self) -> bool {
         self.small_strain().bulk.is_infinite()
     }
@@ -210,9 +210,9 @@ impl AnyLaw {
         Across { modulus, coupling: (moduli.bulk - 2.0 / 3.0 * moduli.shear) / modulus }
     }
 
-    /// An upper bound of ρc² [Pa] of a wall over all directions at rest: E/(1 − ν²), plus what fibres add. In
-    /// the plane an incompressible fibre strains by its whole stretch, not by 2/3 of it: 9/4 of what it adds
-    /// to the solid.
+    /// An upper bound of ρc² [Pa] of a wall over all directions at rest: E/(1 − ν²), plus the part of fibres.
+    /// In the plane an incompressible fibre strains by its whole stretch, in a solid by 2/3. The part of
+    /// fibres is therefore 9/4 of their part in a solid.
     pub(crate) fn plane_modulus(&self) -> f64 {
         let SmallStrainModuli { shear, bulk } = self.small_strain();
         let first = bulk - 2.0 / 3.0 * shear;

@@ -31,7 +31,7 @@ pub(super) fn principal<R: Number>(s: &Symmetric<R>) -> ([R; 3], [Vector<R>; 3])
 /// A tensor on its way to its principal axes.
 struct Turning<R> {
     diagonal: [R; 3],
-    /// The entries beside the diagonal, each at the index that is neither its row nor its column.
+    /// The off-diagonal entries, each at the index that is neither its row nor its column.
     beside: [R; 3],
     /// The axes so far.
     directions: [Vector<R>; 3],

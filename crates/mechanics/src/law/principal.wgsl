@@ -3,18 +3,18 @@
 // A tensor on its way to its principal axes.
 struct Principal {
     values: vec3f,
-    // The entries 23, 13, 12 beside the diagonal.
+    // The off-diagonal entries 23, 13, 12.
     beside: vec3f,
     // The axes so far, one per column.
     directions: mat3x3f,
 }
 
-// Far below any strain, and so far above the root of the smallest number that no square of an entry like it
-// is lost: keeps 0/0 from happening where a tensor is diagonal already.
+// Far below any strain. Also far above the root of the smallest number, so that no square of an entry of this
+// size is lost. Avoids 0/0 where a tensor is diagonal already.
 const TINY: f32 = 1e-18;
 
-// Turns the first two axes until the entry between them is zero, then names the axes (2, 3, 1), so that each
-// pair has its turn.
+// Turns the first two axes until the entry between them is zero. Then renames the axes (2, 3, 1), so that
+// each pair has its turn.
 fn turned(t: Principal) -> Principal {
     let between = t.beside.z;
     let difference = t.values.y - t.values.x;

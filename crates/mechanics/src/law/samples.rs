@@ -14,7 +14,7 @@ pub fn law(name: &str, parameters: Value) -> AnyLaw {
     AnyLaw::from_json(name, parameters).unwrap_or_else(|error| panic!("`{name}`: {error}"))
 }
 
-/// Every law, and those with a choice of volumetric energies with each of them.
+/// Returns every law; laws with a choice of volumetric energies come once with each energy.
 ///
 /// # Panics
 /// If a law of the registry is missing here.

@@ -1,10 +1,10 @@
-//! The shear stiffness of a deformed state over that at rest, for stiffness against hourglass patterns that
-//! follows the law.
+//! The shear stiffness of a deformed state over the shear stiffness at rest. It makes the stiffness against
+//! hourglass patterns follow the law.
 //!
-//! The modulus |dev τ| / |dev b̄| is that of the neo-Hookean solid with the same Kirchhoff stress τ at the
-//! same b̄ = J^(−2/3) F Fᵀ. In a plane of two principal stretches it is (τᵢ − τⱼ)/(λ̄ᵢ² − λ̄ⱼ²), the tangent
-//! modulus of a superposed shear over the mean of λ̄² (Ogden 1984, *Non-linear Elastic Deformations*, 6.3).
-//! The ratio of that modulus to the one at rest is
+//! The modulus |dev τ| / |dev b̄| belongs to a neo-Hookean solid with the same Kirchhoff stress τ at the same
+//! b̄ = J^(−2/3) F Fᵀ. In a plane of two principal stretches it is (τᵢ − τⱼ)/(λ̄ᵢ² − λ̄ⱼ²). This is the
+//! tangent modulus of a superposed shear over the mean of λ̄² (Ogden 1984, *Non-linear Elastic Deformations*,
+//! 6.3). The ratio of that modulus to the one at rest is
 //!
 //! ```text
 //! r = |dev τ| / (μ √(|dev b̄|² + ε²)),   ε = SMALL,
@@ -24,8 +24,8 @@
 //! G = g′ r ((2 T S + S′)/|dev τ|² − ∂|dev b̄|²/∂C / (|dev b̄|² + ε²)),   g′ = (x⁴ + 3 δ² x²)/(x² + δ²)²,   T = S C − ⅓ tr(S C) I,
 //! ```
 //!
-//! where S′ is the derivative of S along δF = dev τ F = F T, found by differences: nothing but the stress is
-//! asked of a law. A part J U′(J) C⁻¹ of the stress has no part in G, as 2 T S + S′ of it vanishes.
+//! where S′ is the derivative of S along δF = dev τ F = F T, found by differences: only the stress of a law
+//! is needed. A part J U′(J) C⁻¹ of the stress does not change G, since its 2 T S + S′ vanishes.
 
 use super::Deformation;
 use crate::Number;
@@ -43,7 +43,7 @@ const BEND: f64 = 0.1;
 pub struct ShearGrowth<N> {
     /// g.
     pub factor: N,
-    /// g′ r, the change of g by that of ln r.
+    /// g′ r, the change of g by the change of ln r.
     slope: N,
     /// T [Pa].
     deviator: Tensor<N>,
@@ -137,7 +137,7 @@ mod tests {
         (deformation, stress, growth)
     }
 
-    /// Of every law in a pressed and sheared state.
+    /// The gradient matches differences for every law in a pressed and sheared state.
     #[test]
     fn the_gradient_is_the_derivative_of_the_factor() {
         let mut random = Random::new(23);

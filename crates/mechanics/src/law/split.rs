@@ -1,6 +1,6 @@
-//! Laws whose energy is the sum of one of shape and one of volume, Ψ = Ψ_iso(C̄) + U(J): such a law states
-//! its isochoric part and names its [`Volumetric`] energy; this file makes it a [`Law`]. And the parameters
-//! all of them share.
+//! Laws whose energy is the sum of one of shape and one of volume, Ψ = Ψ_iso(C̄) + U(J). Such a law states
+//! its isochoric part and names its [`Volumetric`] energy; this file makes it a [`Law`]. The file also has
+//! the parameters that all these laws share.
 
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -16,7 +16,7 @@ use crate::tensor::{Symmetric, Vector};
 
 /// A law with an isochoric and a volumetric energy.
 pub trait SplitLaw: Copy + Send + Sync + 'static {
-    /// What a user gives, each parameter with unit and range.
+    /// Parameters from the user, each with unit and range.
     type Parameters: DeserializeOwned + JsonSchema;
 
     /// Checks and converts the user's parameters.
@@ -33,7 +33,7 @@ pub trait SplitLaw: Copy + Send + Sync + 'static {
     /// The isochoric stress in WGSL: `fn isochoric_stress(d: Deformation, a: vec3f, b: vec3f) -> Symmetric`.
     const WGSL: &'static str;
 
-    /// What it reads as `parameter(1)` and on; `parameter(0)` is the bulk modulus.
+    /// Values of `parameter(1)` and on; `parameter(0)` is the bulk modulus.
     fn shader_parameters(&self) -> Vec<f64>;
 
     /// The volumetric energy.
@@ -52,15 +52,15 @@ pub trait SplitLaw: Copy + Send + Sync + 'static {
         0.0
     }
 
-    /// Whether the shear stiffness never rises; see [`Law::keeps_shear_stiffness`].
+    /// True if the shear stiffness never rises; see [`Law::keeps_shear_stiffness`].
     fn keeps_shear_stiffness(&self) -> bool {
         false
     }
 }
 
 /// The largest ρc² [Pa] that fibres of the energy η/2 (Ī₄ − 1)² feel at rest. For a wave along n that moves
-/// along m the rate of Ī₄ is 2 ((a·n)(a·m) − n·m/3); (a·n)(a·m) lies between (n·m − 1)/2 and (n·m + 1)/2,
-/// hence |rate| ≤ 4/3, reached along the fibre: 16/9 η.
+/// along m the rate of Ī₄ is 2 ((a·n)(a·m) − n·m/3). The product (a·n)(a·m) lies between (n·m − 1)/2 and
+/// (n·m + 1)/2. Hence |rate| ≤ 4/3, reached along the fibre: 16/9 η.
 pub(super) fn fibre_stiffness(modulus: f64) -> f64 {
     16.0 / 9.0 * modulus
 }
@@ -125,7 +125,7 @@ pub struct Matrix {
     /// The two moduli.
     #[serde(flatten)]
     pub elastic: ElasticConstants,
-    /// How the energy grows with the change of volume.
+    /// Form of the energy U(J) of a change of volume.
     #[serde(default)]
     pub volumetric: VolumetricEnergy,
 }
@@ -153,7 +153,7 @@ pub struct Compressibility {
     /// for membranes and shells.
     #[schemars(extend("exclusiveMinimum" = -1.0, "maximum" = 0.5))]
     pub poisson_ratio: Option<f64>,
-    /// How the energy grows with the change of volume.
+    /// Form of the energy U(J) of a change of volume.
     #[serde(default)]
     pub volumetric: VolumetricEnergy,
 }

@@ -1,6 +1,6 @@
 //! St Venant–Kirchhoff law: Ψ = λ/2 (tr E)² + μ E:E, S = λ tr(E) I + 2μ E. Linear in the Green–Lagrange
-//! strain, for small strains under large rotations only: it softens under compression and collapses (in
-//! uniaxial strain the force falls from the stretch 1/√3 = 0.577 on) and its energy stays finite at J → 0.
+//! strain, for small strains under large rotations only. It softens under compression and collapses: in
+//! uniaxial strain the force falls from the stretch 1/√3 = 0.577 on. Its energy stays finite at J → 0.
 
 use schemars::JsonSchema;
 use serde::Deserialize;

@@ -1,6 +1,6 @@
-//! The tangent of a law, D = ∂S/∂ε with the engineering strains ε = (E₁₁, E₂₂, E₃₃, 2E₁₂, 2E₂₃, 2E₁₃), by
-//! central differences along δF = F⁻ᵀ δE, for which δC = 2 δE up to terms that cancel. Right for every law,
-//! to 1e-9 of its largest entry: nothing but the stress is asked of a law. Twelve stresses a tangent.
+//! The tangent of a law, D = ∂S/∂ε with the engineering strains ε = (E₁₁, E₂₂, E₃₃, 2E₁₂, 2E₂₃, 2E₁₃).
+//! Central differences along δF = F⁻ᵀ δE give δC = 2 δE up to terms that cancel. Right for every law, to 1e-9
+//! of its largest entry: only the stress of a law is needed. Twelve stresses a tangent.
 
 use super::{AnyLaw, Deformation, Split};
 use crate::tensor::{Symmetric, Tensor, Vector};

@@ -21,7 +21,7 @@ pub struct TransverselyIsotropic {
     pub volumetric: Volumetric,
 }
 
-/// Which formula a published fibre modulus belongs to.
+/// Formula to which a published fibre modulus belongs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FibreConvention {

@@ -19,7 +19,7 @@ use super::{Deformation, Shader};
 use crate::Number;
 use crate::tensor::Symmetric;
 
-/// How the energy grows with the change of volume.
+/// Form of the energy U(J) of a change of volume.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum VolumetricEnergy {
@@ -82,8 +82,8 @@ impl Volumetric {
         deformation.inverse_cauchy_green * self.kirchhoff_pressure(deformation)
     }
 
-    /// A law with this energy in WGSL: `snippets` and `own` are the rest of it, its parameters from index 1
-    /// on.
+    /// A law with this energy in WGSL. `snippets` and `own` are the rest of its text, and its parameters from
+    /// index 1 on.
     pub(super) fn shader(&self, snippets: &[&str], own: &[f64]) -> Shader {
         let pressure = match self.energy {
             VolumetricEnergy::Quadratic => "j * x",

@@ -36,7 +36,7 @@ pub enum Cells {
     Bar(CellBlock<2>, Cord),
 }
 
-/// How tetrahedra average their pressure over nodes; see `forces/averaged.rs`.
+/// Method by which tetrahedra average their pressure over nodes; see `forces/averaged.rs`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Averaging {
     /// Average nodal pressure (Bonet and Burton 1998): the recommended tetrahedron.
@@ -60,7 +60,7 @@ pub struct CellBlock<const N: usize> {
     pub offsets: Vec<[Vector<f64>; N]>,
 }
 
-/// Hourglass control: energy ½ k Σ_c |Σ_a γ_ca u_a|², or ½ k g of it.
+/// Hourglass control: energy ½ k Σ_c |Σ_a γ_ca u_a|², or g times this energy.
 #[derive(Clone, Debug)]
 pub struct Hourglass<R, const N: usize> {
     /// The patterns γ, four per cell.
@@ -71,7 +71,7 @@ pub struct Hourglass<R, const N: usize> {
     pub stiffness: Vec<R>,
     /// κ² [1/m²] of each cell: how far corners follow the patterns; see [`Hex8::corner_reach`].
     pub corner_reach: Vec<R>,
-    /// Whether the stiffness grows with the shear stiffness of the law, k g; see
+    /// True if the stiffness grows with the shear stiffness of the law, k g; see
     /// [`ShearGrowth`](crate::law::ShearGrowth).
     pub grows: bool,
 }
@@ -131,8 +131,8 @@ impl Cells {
         })
     }
 
-    /// The same cells, whose stiffness against hourglass patterns grows with the shear stiffness of their
-    /// law. Without it evenly squeezed cells of a law that stiffens collapse into these patterns.
+    /// Lets the stiffness against hourglass patterns grow with the shear stiffness of the law. Without this
+    /// growth evenly squeezed cells of a law that stiffens collapse into these patterns.
     pub fn with_growing_hourglass(mut self) -> Self {
         if let Self::Hex8(CellBlock { hourglass: Some(control), .. }) = &mut self {
             control.grows = true;
@@ -173,10 +173,10 @@ impl Cells {
         Self::Bar(CellBlock { nodes, rest: quantities, hourglass: None, offsets: vec![] }, cord)
     }
 
-    /// The same cells, each filled only in part, as cubes at the border of a body are: its volume and with it
-    /// its stiffness and mass are those of its fraction, one per cell, of [`LEAST_FRACTION`] at least.
-    /// Gradients stay, and with them element bounds. One constant weight a cell is the simplest of the finite
-    /// cells of Parvizian, Düster and Rank (2007).
+    /// Fills each cell only in part, as cubes at the border of a body are. Volume, stiffness and mass are
+    /// multiplied by the cell's fraction, at least [`LEAST_FRACTION`]. Gradients stay, and with them element
+    /// bounds. One constant weight a cell is the simplest of the finite cells of Parvizian, Düster and Rank
+    /// (2007).
     ///
     /// # Panics
     /// If there are not as many fractions as cells.
@@ -191,7 +191,7 @@ impl Cells {
         self
     }
 
-    /// The same cells in another order.
+    /// Returns the cells in another order.
     pub(super) fn in_order(&self, order: &[u32]) -> Self {
         match self {
             Self::Tet4(block) => Self::Tet4(block.in_order(order)),
@@ -208,7 +208,7 @@ impl Cells {
         if matches!(self, Self::FullHex8(..)) { 8 } else { 1 }
     }
 
-    /// True where pressures are averaged, so that a point has none of its own.
+    /// True where pressures are averaged, so that a point has no pressure alone.
     pub fn averages_pressure(&self) -> bool {
         matches!(self, Self::AveragedTet4(_, Averaging::Nodal | Averaging::Variational) | Self::FullHex8(..))
     }
@@ -305,7 +305,7 @@ pub(super) fn offsets(nodes: &[[u32; 8]], rest: &[Vector<f64>]) -> Vec<[Vector<f
     nodes.iter().map(of_cell).collect()
 }
 
-/// The nodes of some cells, numbered among themselves in increasing order, and the cells at each of them.
+/// The nodes of some cells, numbered among themselves in increasing order, and the cells at each node.
 #[derive(Clone, Debug)]
 pub struct LocalNodes {
     /// Local nodes of each cell.
@@ -317,7 +317,7 @@ pub struct LocalNodes {
 }
 
 impl LocalNodes {
-    /// From the cells.
+    /// Makes the local nodes of some cells.
     pub fn new(cells: &CellBlock<4>) -> Self {
         let mut global: Vec<u32> = cells.nodes.iter().flatten().copied().collect();
         global.sort_unstable();

@@ -11,15 +11,16 @@ pub struct Constraint {
     pub name: String,
     /// The nodes.
     pub nodes: Vec<u32>,
-    /// Which of x, y and z it prescribes, and which of the rotations about them, where nodes have some.
+    /// Components that the constraint prescribes: x, y and z, and the rotations about them, where nodes have
+    /// rotations.
     pub components: [bool; 6],
-    /// Where they go.
+    /// Prescribed motion.
     pub motion: Motion,
 }
 
 impl Constraint {
-    /// The force λ [N] with which a mean is held, w λ on each node, of the forces [N] that its nodes resist
-    /// with: by least squares, exact in equilibrium. None for other motions.
+    /// Returns the force λ [N] that holds a mean, with w λ on each node. It is found from the resisting
+    /// forces [N] of the nodes by least squares, exact in equilibrium. Zero for other motions.
     pub fn mean_force(&self, resisting: impl Fn(u32) -> Vector<f64>) -> Vector<f64> {
         let Motion::Mean { weights, .. } = &self.motion else { return [0.0; 3] };
         let squared: f64 = weights.iter().map(|w| w * w).sum();
@@ -30,9 +31,9 @@ impl Constraint {
         scale(sum, 1.0 / squared)
     }
 
-    /// The forces [N] with which a mean or an enclosed volume is held, node by node, of the forces [N] that
-    /// its nodes resist with at some places [m]: by least squares over the components that are free, exact in
-    /// equilibrium. None for other motions and on facets of shells.
+    /// Returns the forces [N] that hold a mean or an enclosed volume, node by node. They are found from the
+    /// resisting forces [N] of the nodes at some places [m], by least squares over the free components. Exact
+    /// in equilibrium. Empty for other motions; facets of shells do not count.
     pub fn borne(
         &self,
         place: impl Fn(u32) -> Vector<f64>,
@@ -58,8 +59,8 @@ impl Constraint {
         }
     }
 
-    /// Displacement [m] that the nodes of a mean lack at a time [s], on average; zero of other constraints.
-    /// `displacement` is that of a node [m].
+    /// Displacement [m] that the nodes of a mean lack at a time [s], on average; zero for other constraints.
+    /// `displacement` gives the displacement of a node [m].
     pub fn missing_mean(&self, time: f64, displacement: impl Fn(u32) -> Vector<f64>) -> Vector<f64> {
         let Motion::Mean { weights, by, curve } = &self.motion else { return [0.0; 3] };
         let add_node = |sum, (&node, &weight): (&u32, &f64)| add(sum, scale(displacement(node), weight));
@@ -74,10 +75,11 @@ impl Constraint {
     }
 }
 
-/// What the two factors of a motion multiply. All but rotations have one, the other is zero.
+/// Vectors that the two factors of a motion multiply. Only rotations have two; for other motions the second
+/// is zero.
 pub type Amplitudes = [Vector<f64>; 2];
 
-/// How a prescribed motion goes over time.
+/// Prescribed motion over time.
 #[derive(Clone, Debug)]
 pub enum Motion {
     /// They stay where they are at rest.
@@ -88,8 +90,8 @@ pub enum Motion {
     Displacements(Vec<Vector<f64>>, Curve),
     /// Displacements [m], one per node, with a rotation vector [rad] that turns each node about its own
     /// place, × curve. With all three rotations prescribed a node turns by exp(curve · vector) exactly, about
-    /// any axis by any angle; with fewer, those components of its spin are. Constraints with courses of their
-    /// own on the same node about different axes do not commute.
+    /// any axis by any angle. With fewer, only those components of its spin are prescribed. Constraints with
+    /// different curves on the same node about different axes do not commute.
     Turn {
         /// The displacements [m].
         by: Vec<Vector<f64>>,
@@ -110,10 +112,10 @@ pub enum Motion {
         /// Its curve over time.
         curve: Curve,
     },
-    /// The mean of their displacements goes by so much [m] × curve, with weights that sum to 1; each by
-    /// itself is free, as under a plate that tilts.
+    /// The mean of their displacements is a displacement [m] × curve, with weights that sum to 1. Each node
+    /// by itself is free, as under a plate that tilts.
     Mean {
-        /// One for each node of the constraint.
+        /// Weights, one for each node of the constraint.
         weights: Vec<f64>,
         /// Displacement [m].
         by: Vector<f64>,
@@ -122,10 +124,10 @@ pub enum Motion {
     },
     /// Together they move as a rigid body, free in space.
     Rigid,
-    /// The volume that faces enclose grows by so much [m³] × curve from what it is at rest; a uniform
-    /// pressure on them does it.
+    /// The volume that faces enclose grows from its rest value by a volume [m³] × curve; a uniform pressure
+    /// on the faces acts as the force.
     Volume {
-        /// What encloses it.
+        /// Surface that encloses the volume.
         enclosure: Enclosure,
         /// The growth [m³].
         by: f64,
@@ -137,7 +139,7 @@ pub enum Motion {
 /// A closed surface, made of faces of solids and membranes or of facets of shells.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Enclosure {
-    /// Faces, numbered by the nodes of their constraint; normals outwards from what is enclosed.
+    /// Faces, numbered by the nodes of their constraint; normals point out of the enclosed volume.
     pub faces: Vec<Face>,
     /// Facets of shells, numbered in the model; normals outwards, too.
     pub facets: Vec<u32>,
@@ -156,7 +158,7 @@ impl Enclosure {
     }
 }
 
-/// Corrections of a volume at most: six make that of a ball eightfold.
+/// Largest number of corrections of a volume: six are enough for a ball that grows eightfold.
 pub(super) const CORRECTIONS: usize = 50;
 
 /// A volume that is off by no more, over itself, is where it should be.
@@ -182,7 +184,7 @@ pub fn fill<S: ?Sized>(
     }
 }
 
-/// What a constraint of volume has at an instant.
+/// Volume and pressure of a constraint of volume at an instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Enclosed {
     /// The volume [m³].
@@ -192,18 +194,18 @@ pub struct Enclosed {
 }
 
 impl Motion {
-    /// Whether it binds nodes to each other and prescribes none by itself.
+    /// True if the motion binds nodes to each other and prescribes no node by itself.
     pub fn is_collective(&self) -> bool {
         matches!(self, Self::Mean { .. } | Self::Rigid | Self::Volume { .. })
     }
 
-    /// Whether it fills a volume.
+    /// True if the motion fills a volume.
     pub fn encloses(&self) -> bool {
         matches!(self, Self::Volume { .. })
     }
 
-    /// Rotation of nodes about an axis through a centre [m], by an angle [rad] × curve, by Rodrigues' formula
-    /// u = sin θ k × r + (1 − cos θ) k × (k × r). The axis need not be of unit length, nor zero.
+    /// Rotation of nodes about an axis through a centre [m], by an angle [rad] × curve. Rodrigues' formula
+    /// gives u = sin θ k × r + (1 − cos θ) k × (k × r). The axis need not be of unit length, nor zero.
     pub fn rotation(
         axis: Vector<f64>,
         centre: Vector<f64>,
@@ -219,12 +221,12 @@ impl Motion {
         Self::Rotation { arms: rest.map(arm).collect(), angle, curve }
     }
 
-    /// A displacement [m] and a rotation vector [rad] of each of so many nodes, × curve.
+    /// Makes a displacement [m] and a rotation vector [rad] for each of `nodes` nodes, × curve.
     pub fn turn(by: Vector<f64>, turn: Vector<f64>, nodes: usize, curve: Curve) -> Self {
         Self::Turn { by: vec![by; nodes], turn, curve }
     }
 
-    /// What the factors multiply: the displacement [m], the velocity [m/s] or the arms [m] of the
+    /// Vectors that the factors multiply: the displacement [m], the velocity [m/s] or the arms [m] of the
     /// constraint's node at `index`.
     pub fn amplitudes(&self, index: usize) -> Amplitudes {
         let one = |amplitude| [amplitude, [0.0; 3]];
@@ -278,12 +280,12 @@ impl Motion {
         [x, y, z, turn[0], turn[1], turn[2]]
     }
 
-    /// How far the constraint's node at `index` goes between two times [s]: its displacement [m] and its
+    /// Increment of the constraint's node at `index` between two times [s]: its displacement [m] and its
     /// rotation vector [rad].
     pub fn increment(&self, index: usize, from: f64, to: f64) -> [f64; 6] {
         let shift = match self {
             Self::Fixed | Self::Rigid | Self::Volume { .. } => [0.0; 3],
-            // The difference of the factors first: it is exact to more digits than that of places.
+            // The difference of the factors first: it is exact to more digits than the difference of places.
             Self::Displacement(_, curve)
             | Self::Displacements(_, curve)
             | Self::Turn { curve, .. }
@@ -301,7 +303,7 @@ impl Motion {
         [shift[0], shift[1], shift[2], spin[0], spin[1], spin[2]]
     }
 
-    /// Whether two motions of the same amplitudes are the same at all times.
+    /// True if two motions of the same amplitudes are the same at all times.
     pub(super) fn follows(&self, other: &Self) -> bool {
         let curve = |motion: &Self| match motion {
             Self::Fixed | Self::Rigid => None,
@@ -318,7 +320,7 @@ impl Motion {
 }
 
 impl Motion {
-    /// Whether two motions turn nodes in the same way at all times.
+    /// True if two motions turn nodes in the same way at all times.
     pub(super) fn turns_as(&self, other: &Self) -> bool {
         let curve = |motion: &Self| match motion {
             Self::Turn { turn, curve, .. } if *turn != [0.0; 3] => Some((*turn, curve.clone())),

@@ -25,7 +25,7 @@ pub use crate::with_cells;
 pub struct Model {
     /// Rest positions [m] of the nodes.
     pub rest: Vec<Vector<f64>>,
-    /// Lumped masses [kg] of the nodes, those of their materials.
+    /// Lumped masses [kg] of the nodes, from their materials.
     pub mass: Vec<f64>,
     /// The bodies.
     pub bodies: Vec<Body>,
@@ -63,7 +63,7 @@ impl MassScaling {
         self.added.iter().sum()
     }
 
-    /// How many nodes are heavier.
+    /// Number of nodes with added mass.
     pub fn nodes(&self) -> usize {
         self.added.iter().filter(|&&added| added > 0.0).count()
     }
@@ -74,17 +74,17 @@ impl MassScaling {
 pub struct Body {
     /// Its name.
     pub name: String,
-    /// The nodes of its own.
+    /// Its nodes, without shared ones.
     pub nodes: Range<u32>,
-    /// The nodes of other bodies that its cells use, numbered in the model: those of a wall on the boundary
-    /// of a solid.
+    /// The nodes of other bodies that its cells use, numbered in the model: the nodes of a wall on the
+    /// boundary of a solid.
     pub shared: Vec<u32>,
     /// Mass-proportional damping α [1/s].
     pub damping: f64,
 }
 
 impl Body {
-    /// The model's number of a node of its mesh: its own nodes first, then those that it shares.
+    /// Returns the model's number of a node of its mesh: first the body's nodes, then the shared ones.
     pub fn node(&self, index: u32) -> u32 {
         let own = self.nodes.len() as u32;
         if index < own { self.nodes.start + index } else { self.shared[(index - own) as usize] }
@@ -142,8 +142,8 @@ impl Solid {
         &self.fibre[cell * families..(cell + 1) * families]
     }
 
-    /// The directions of the families of fibres in a cell as its law sees them: those at rest, in a membrane
-    /// within the frame of the triangle.
+    /// Returns the directions of the families of fibres in a cell as its law sees them. These are the
+    /// directions at rest; in a membrane they are within the frame of the triangle.
     pub fn law_fibres(&self, cell: usize) -> Cow<'_, [Vector<f64>]> {
         let Cells::Membrane(_, sheets) = &self.cells else { return Cow::Borrowed(self.fibres(cell)) };
         let sheet = &sheets[cell];
@@ -155,7 +155,7 @@ impl Solid {
         Cow::Owned(self.fibres(cell).iter().map(in_plane).collect())
     }
 
-    /// An upper bound of ρc² [Pa] at rest: of a membrane that of plane stress, of a bar that of uniaxial
+    /// An upper bound of ρc² [Pa] at rest; a membrane has its bound in plane stress, a bar in uniaxial
     /// stress.
     pub fn longitudinal_modulus(&self) -> f64 {
         match &self.cells {
@@ -165,8 +165,8 @@ impl Solid {
         }
     }
 
-    /// The shear modulus at rest [Pa] over which that of a state is the factor on the hourglass stiffness;
-    /// `None` where that stiffness stays.
+    /// Shear modulus at rest [Pa]. The shear modulus of a state over this value is the factor on the
+    /// hourglass stiffness. `None` where that stiffness is constant.
     pub fn hourglass_growth(&self) -> Option<f64> {
         let Cells::Hex8(CellBlock { hourglass: Some(control), .. }) = &self.cells else { return None };
         let law = &self.material.law;
@@ -182,7 +182,7 @@ impl Solid {
         }
     }
 
-    /// The same solid with neighbouring cells one after another.
+    /// Returns the solid with neighbouring cells one after another.
     fn in_order(self, rest: &[Vector<f64>]) -> Self {
         let centre = |cell: usize| {
             let nodes = self.cells.nodes(cell);
@@ -204,7 +204,7 @@ fn picked<T: Clone>(values: &[T], cells: &[u32]) -> Vec<T> {
     cells.iter().map(|&cell| values[cell as usize].clone()).collect()
 }
 
-/// A cell counts as filled by so much at least: nodes that hang on slivers alone would move wildly.
+/// Least filled fraction of a cell: nodes that hang on slivers alone would move wildly.
 pub const LEAST_FRACTION: f64 = 0.1;
 
 /// A surface carried by a body.
@@ -216,7 +216,7 @@ pub struct Surface {
     pub body: usize,
     /// Rest positions [m] of its points.
     pub rest: Vec<Vector<f64>>,
-    /// How it follows the body's nodes (numbered in the model).
+    /// Weights of the body's nodes (numbered in the model) for each point.
     pub mapping: Weights,
 }
 
@@ -271,8 +271,9 @@ impl Model {
         self.bodies.len() - 1
     }
 
-    /// Adds a body on nodes that other bodies have, such as a wall on the boundary of a solid; its number.
-    /// The nodes stay those of their bodies: damping, gravity and velocity at the start are theirs.
+    /// Adds a body on nodes that other bodies have, such as a wall on the boundary of a solid. Returns its
+    /// number. The nodes still belong to the other bodies, which set their damping, gravity and initial
+    /// velocity.
     pub fn add_body_on(&mut self, name: &str, shared: Vec<u32>) -> usize {
         let body = self.add_body(name, &[]);
         self.bodies[body].shared = shared;
@@ -303,12 +304,13 @@ impl Model {
         self.solids.push(solid);
     }
 
-    /// The mass [kg] with which a node resists acceleration: that of the material and what mass scaling adds.
+    /// The mass [kg] with which a node resists acceleration: the mass of the material and the mass that
+    /// scaling adds.
     pub fn inertia(&self, node: usize) -> f64 {
         self.mass[node] + self.mass_scaling.as_ref().map_or(0.0, |scaling| scaling.added[node])
     }
 
-    /// The same model with threads that are taut: its vibrations are the fastest that they allow.
+    /// Returns the model with all threads taut: its vibrations are the fastest that they allow.
     pub fn with_taut_threads(&self) -> Cow<'_, Self> {
         let is_thread = |solid: &Solid| matches!(solid.cells, Cells::Bar(_, Cord { tension_only: true, .. }));
         if !self.solids.iter().any(is_thread) {
@@ -365,8 +367,8 @@ impl Model {
         weights
     }
 
-    /// The constraint on each component of each node, [`FREE`] where there is none. Two constraints may
-    /// prescribe the same motion of a component (the first keeps the reaction).
+    /// Returns the constraint on each component of each node; [`FREE`] marks a component without constraint.
+    /// Two constraints may prescribe the same motion of a component (the first keeps the reaction).
     ///
     /// # Errors
     /// If two constraints prescribe different motions for one component of a node.
@@ -414,8 +416,8 @@ impl Model {
         self.constraints.iter().find(|constraint| constraint.motion.is_collective())
     }
 
-    /// The constraint that binds each node to others, [`FREE`] where there is none: one at most, and no other
-    /// holds the node.
+    /// Returns the constraint that binds each node to others; [`FREE`] marks a node without one. A node has
+    /// at most one such constraint, and no other constraint holds the node.
     fn check_collective(&self, owners: &[[u32; 3]]) -> Result<Vec<u32>, Contradiction> {
         let mut bound = vec![FREE; self.node_count()];
         for (index, constraint) in self.constraints.iter().enumerate() {
@@ -434,7 +436,7 @@ impl Model {
         Ok(bound)
     }
 
-    /// Whether no two constraints turn a node differently.
+    /// Checks that no two constraints turn a node differently.
     fn check_rotations(&self) -> Result<(), Contradiction> {
         let turned = |constraint: &Constraint| constraint.components[3..].contains(&true);
         if !self.constraints.iter().any(|own| turned(own) && matches!(own.motion, Motion::Turn { .. })) {

@@ -34,7 +34,7 @@ pub struct Anatomy<'a> {
     pub(crate) materials: Vec<(i32, Option<Box<dyn ImplicitField + 'a>>)>,
     /// Volume of each material in the image [m³], if it comes from an image.
     pub(crate) volumes: Vec<Option<f64>>,
-    /// What its fields were made of, if they were.
+    /// The triangles or voxels that the fields were made from, if any.
     given: Option<Given>,
 }
 
@@ -44,15 +44,16 @@ impl<'a> Anatomy<'a> {
         Self { whole: Box::new(field), materials: vec![(label, None)], volumes: vec![None], given: None }
     }
 
-    /// The same of one material made of a closed surface, with its volume [m³], which meshes are to keep.
+    /// Records the closed surface that the one material was made from, and its volume [m³], which meshes are
+    /// to keep.
     pub(crate) fn of_surface(mut self, surface: TriangleMesh, volume: f64) -> Self {
         self.volumes[0] = Some(volume);
         self.given = Some(Given::Triangles(surface, self.materials[0].0));
         self
     }
 
-    /// Distances of its meshes are measured to the faces of these voxels: the material of each point of
-    /// `grid`, numbered from 1 in the order of their addition, 0 outside.
+    /// Measures distances of its meshes to the faces of these voxels. `materials` gives the material of each
+    /// point of `grid`, numbered from 1 in the order of addition, 0 outside.
     ///
     /// # Panics
     /// If the numbers of materials and of points of the grid differ, or a material has no field.
@@ -82,8 +83,7 @@ impl<'a> Anatomy<'a> {
         self.materials[0].1.as_deref().map(|field| field as &dyn ImplicitField)
     }
 
-    /// Whether each material has a signed distance of its own, as those of voxels have from three materials
-    /// on.
+    /// True if each material has its own signed distance. Bodies of voxels have one from three materials on.
     pub(crate) fn has_own_fields(&self) -> bool {
         matches!(self.given, Some(Given::Voxels { .. }))
             && self.materials.iter().all(|(_, field)| field.is_some())

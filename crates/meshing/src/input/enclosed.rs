@@ -1,8 +1,8 @@
 //! The body inside a closed surface, as a field of signed distances. The surface is repaired like every
-//! surface from a file (`triangles.rs`); narrow holes are closed. Where it intersects itself, or parts with
-//! the same orientation lie inside each other, the body is all that it winds around (`winding.rs`), without
-//! the surface inside it. Distances are exact on a grid and linear in between; they are clipped beyond two
-//! edges of the cells. Leaves out: open surfaces, several materials.
+//! surface from a file (`triangles.rs`); narrow holes are closed. If the surface intersects itself, or
+//! contains parts of the same orientation, the body is everything that it winds around (`winding.rs`).
+//! Surfaces inside the body are left out. Distances are exact on a grid and linear in between; they are
+//! clipped beyond two edges of the cells. Leaves out: open surfaces, several materials.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -21,13 +21,13 @@ use crate::surface::nesting::{box_of, containers, corners_of, shells, signed_vol
 use crate::surface::triangles::{SurfaceRepairs, TriangleMesh};
 use crate::surface::winding::Winding;
 
-/// Steps of the grid along an edge of the cells: the most for which it fits into memory.
+/// Steps of the grid along an edge of the cells; the largest number that fits into memory is used.
 const STEPS_PER_EDGE: [f64; 3] = [4.0, 3.0, 2.0];
 
 /// Distances beyond this many edges of the cells are cut.
 const REACH: f64 = 2.0;
 
-/// Points of the grid at most: 256 MiB.
+/// Most points of the grid: 256 MiB.
 pub(crate) const MOST_POINTS: usize = 1 << 26;
 
 /// Points along each side of the blocks that are skipped where they are far from the surface.
@@ -41,9 +41,9 @@ const MOST_LEVELS: u32 = 6;
 pub struct Closing {
     /// Width of holes to close [m], if larger than the edge of the cells.
     pub holes: f64,
-    /// Whether to fill cavities.
+    /// True to fill cavities.
     pub fill_cavities: bool,
-    /// Whether to keep only the largest piece, with its cavities.
+    /// True to keep only the largest piece, with its cavities.
     pub keep_largest: bool,
 }
 
@@ -64,9 +64,9 @@ pub struct EnclosedReport {
     pub closed_edges: usize,
     /// Width of the widest of them [m].
     pub widest_hole: f64,
-    /// Pairs of triangles that pass through each other: what overlaps was joined.
+    /// Pairs of triangles that pass through each other: overlapping parts were joined.
     pub crossings: usize,
-    /// Where the first pair does [m].
+    /// Place of the first crossing [m].
     pub first_crossing: Option<[f64; 3]>,
     /// Pieces inside another one with the same orientation, joined with it.
     pub swallowed_shells: usize,
@@ -77,7 +77,7 @@ pub struct EnclosedReport {
 }
 
 impl EnclosedReport {
-    /// Whether anything was mended, joined, filled or left out.
+    /// True if anything was repaired, joined, filled or left out.
     pub fn is_mended(&self) -> bool {
         let counts = [
             self.closed_holes,
@@ -157,7 +157,7 @@ impl Enclosed {
         Ok(found)
     }
 
-    /// The enclosed volume [m³]; what overlaps counts as often as it does.
+    /// The enclosed volume [m³]; overlaps count several times.
     pub fn volume(&self) -> f64 {
         signed_volume(&self.points, &self.triangles)
     }
@@ -167,7 +167,7 @@ impl Enclosed {
         box_of(self.triangles.iter().flatten().map(|&node| self.points[node as usize]))
     }
 
-    /// Whether no part lies inside another and none intersects another.
+    /// True if no part lies inside another and none intersects another.
     pub fn is_simple(&self) -> bool {
         self.crossing.is_empty() && self.report.swallowed_shells == 0
     }
@@ -188,7 +188,8 @@ impl Enclosed {
         Ok(Anatomy::new(label, field).of_surface(hull, volume))
     }
 
-    /// The same for cells as small as `finest` [m], or as near to that as fits into memory.
+    /// Returns the body as an anatomy for cells as small as `finest` [m], or as near to `finest` as memory
+    /// allows.
     ///
     /// # Errors
     /// If the grid would not fit into memory.
@@ -216,7 +217,7 @@ impl Enclosed {
         self.field_and_hull(edge, progress).map(|(field, _)| field)
     }
 
-    /// The same, and the surface that bounds the body.
+    /// Returns the signed distances and the surface that bounds the body.
     fn field_and_hull(
         &self,
         edge: f64,
@@ -248,8 +249,8 @@ impl Enclosed {
         Ok((field, hull))
     }
 
-    /// The part of the surface that bounds the body: all of it, or the triangles with the body on one side
-    /// only. Intersecting triangles are divided to below a step of the grid [m].
+    /// The part of the surface that bounds the body: the whole surface, or the triangles with the body on one
+    /// side only. Intersecting triangles are divided to below a step of the grid [m].
     pub(crate) fn hull(&self, winding: &Winding, step: f64) -> TriangleMesh {
         if self.is_simple() {
             return TriangleMesh::new(self.points.clone(), self.triangles.clone());

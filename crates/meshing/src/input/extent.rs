@@ -1,4 +1,5 @@
-//! Before anything is allocated: is the box of a field sound, and how many cells will its body need?
+//! Checks before any allocation: the box of a field is sound, and the number of cells of its body is within
+//! the limit.
 
 use pliant_geometry::{CellKind, Vector3};
 
@@ -52,8 +53,8 @@ pub(crate) fn require_room(
     Ok(())
 }
 
-/// Checks, before anything is made of it, that a body of a volume [m³] filled with tets or hexes of `edge`
-/// [m] stays within the limit on cells.
+/// Checks before meshing that a body of a volume [m³] filled with tets or hexes of `edge` [m] stays within
+/// the limit on cells.
 pub fn require_room_for(
     kind: CellKind,
     edge: f64,

@@ -1,5 +1,5 @@
-//! The surfaces that a mesh is to follow as the user gave them: the triangles of a file, or the faces of the
-//! voxels of labels; not the smooth field made of them. Each face knows the labels on its two sides.
+//! The input surfaces that a mesh is to follow: the triangles of a file, or the faces of the voxels of
+//! labels. The smooth fields made from them are elsewhere. Each face knows the labels on its two sides.
 
 use std::fmt;
 
@@ -9,7 +9,7 @@ use serde::Serialize;
 use crate::report::hausdorff::{Sample, lattice};
 use crate::surface::triangles::TriangleMesh;
 
-/// What distances of a mesh are measured to.
+/// Reference that distances of a mesh are measured to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum MeasuredTo {
@@ -32,7 +32,7 @@ impl fmt::Display for MeasuredTo {
     }
 }
 
-/// Where a body comes from.
+/// Source of a body.
 pub(crate) enum Given {
     /// One material within triangles, with its label.
     Triangles(TriangleMesh, i32),
@@ -59,7 +59,7 @@ impl Given {
         }
     }
 
-    /// Its faces; of voxels those between different materials, whose labels are given.
+    /// Its faces. Of voxels these are the faces between different materials; `labels` gives their labels.
     pub(crate) fn patches(&self, labels: &[i32]) -> Patches {
         match self {
             Self::Triangles(surface, label) => {
@@ -204,7 +204,7 @@ fn faces_of_voxels(grid: &Grid, materials: &[u8], label: &dyn Fn(u8) -> i32) -> 
     }
 }
 
-/// Whether a pair of sides is on the boundary of the whole.
+/// True if a pair of sides is on the boundary of the whole.
 pub(crate) fn is_outer(sides: [i32; 2]) -> bool {
     sides.contains(&OUTSIDE_LABEL)
 }

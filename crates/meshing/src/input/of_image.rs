@@ -10,8 +10,8 @@ use crate::tets::complex::MOST_MATERIALS;
 
 /// Best smoothing of the field of an image if [`SURFACE_PAIRS`] smooth its surface afterwards. Of the
 /// settings tested on labels of the analytic liver and brain, this one stays closest to them. With sigma 1
-/// and no pairs, which suits tetrahedra, the largest distance is half as large again on the liver and twice
-/// on the brain; without sigma the steps of the voxels remain.
+/// and no pairs, which suits tetrahedra, the largest distance is 1.5 times as large on the liver and twice on
+/// the brain. Without sigma the steps of the voxels remain.
 pub const SURFACE_SMOOTHING: Smoothing = Smoothing { sigma: 0.55, clip: 6.0 };
 
 /// Pairs of moves for [`TriangleMesh::smooth`](crate::TriangleMesh::smooth) after that.
@@ -31,8 +31,9 @@ impl TriangleMesh {
 }
 
 impl Anatomy<'static> {
-    /// The regions of some labels of an image as one body, each a material: cleaned together (gaps and holes
-    /// are filled with the first label), smoothed one by one. `progress` hears fractions from 0 to 1.
+    /// Makes one body from the regions of some labels of an image, each a material. The regions are cleaned
+    /// together (gaps and holes are filled with the first label) and smoothed one by one. `progress` hears
+    /// fractions from 0 to 1.
     pub fn from_image(
         image: &LabelImage,
         labels: &[i32],
@@ -55,8 +56,8 @@ impl Anatomy<'static> {
         }
         volumes[0] = Some(whole.volume() - others);
         if labels.len() > 2 {
-            // The remainder of several others is a poor measure of the first one: where two of them meet, it
-            // is as near as they are.
+            // The remainder of several others measures the first one poorly: where two others meet, it is as
+            // near as they are.
             let first = parts.distance_field(1, smoothing, &part(labels.len()))?;
             materials[0].1 = Some(Box::new(first));
         }

@@ -10,17 +10,16 @@ use crate::tets::near_materials::NearMaterials;
 /// The surfaces of the whole body and of its inner materials.
 pub(crate) struct Surfaces<'a> {
     anatomy: &'a Anatomy<'a>,
-    /// Where the surfaces of the whole (0) and of the inner materials lie: at these values of their fields
-    /// [m].
+    /// Field values at the surfaces of the whole (0) and of the inner materials [m].
     levels: Vec<f64>,
     /// Lattice constant of the mesh [m].
     edge: f64,
-    /// Which materials a point can be deep in.
+    /// Materials that a point can be deep in.
     near: NearMaterials,
 }
 
 impl<'a> Surfaces<'a> {
-    /// For a mesh with a lattice constant [m].
+    /// Makes the surfaces for a mesh with a lattice constant [m].
     pub(crate) fn new(anatomy: &'a Anatomy<'a>, edge: f64) -> Self {
         Self {
             anatomy,
@@ -41,14 +40,14 @@ impl<'a> Surfaces<'a> {
     }
 
     /// Moves the surface of the whole (0) or of an inner material (its number less one) outwards [m], by at
-    /// most `most` in all; whether it moves.
+    /// most `most` in all. Returns true if it moves.
     pub(crate) fn shift(&mut self, surface: usize, outwards: f64, most: f64) -> bool {
         let level = (self.levels[surface] - outwards).clamp(-most, most);
         std::mem::replace(&mut self.levels[surface], level) != level
     }
 
-    /// How far a point is inside a material (numbered from 1) rather than in any other [m]; of one far from
-    /// the material only the sign counts.
+    /// Depth of a point inside a material (numbered from 1) relative to all others [m]. Far from the material
+    /// only the sign counts.
     pub(crate) fn inside(&self, material: usize, point: &Vector3) -> f64 {
         if self.near.is_far(material, point) {
             return -self.edge;
@@ -64,8 +63,8 @@ impl<'a> Surfaces<'a> {
         depths.max_by(|a, b| a.0.total_cmp(&b.0)).map_or(1, |(_, material)| material)
     }
 
-    /// Field of a material [m]. The first one has no field of its own; it is the remainder of the others,
-    /// minus the deepest of them.
+    /// Field of a material [m]. If the first material has no field, its value is minus the deepest of the
+    /// others: it is their remainder.
     fn depth(&self, material: usize, point: &Vector3) -> f64 {
         match (material, self.anatomy.first()) {
             (1, Some(first)) => first.value(point),
@@ -97,8 +96,8 @@ impl<'a> Surfaces<'a> {
         }
     }
 
-    /// What must be zero at a point between sides, with its gradient: the field of the body on its boundary,
-    /// the difference of two materials between them. At most three.
+    /// Constraints, with gradients, that are zero at a point between sides. They are the field of the body on
+    /// its boundary and the difference of two materials between them. At most three.
     pub(crate) fn constraints(&self, sides: Sides, point: &Vector3) -> Constraints {
         let mut found = Constraints::default();
         if sides & OUTSIDE != 0 {
@@ -117,12 +116,12 @@ impl<'a> Surfaces<'a> {
         found
     }
 
-    /// How far off a point is from where its sides meet [m].
+    /// Distance of a point from the place where its sides meet [m].
     pub(crate) fn off(&self, sides: Sides, point: &Vector3) -> f64 {
         self.constraints(sides, point).largest()
     }
 
-    /// Whether a point is inside the body, or outside with more than `room` [m] to another bank of it.
+    /// True if a point is inside the body, or outside with more than `room` [m] to the opposite bank.
     pub(crate) fn has_room(&self, point: &Vector3, room: f64) -> bool {
         let field = self.anatomy.field();
         let depth = |point: &Vector3| field.value(point) - self.levels[0];
@@ -131,8 +130,9 @@ impl<'a> Surfaces<'a> {
         here >= 0.0 || depth(&onward) < here - room / 2.0
     }
 
-    /// The closest point between the same sides, by Newton's method with steps of at most `longest` [m] on
-    /// the least move, and the gradient of the first constraint there; `None` if it is not found.
+    /// Finds the closest point between the same sides by Newton's method, with least-move steps of at most
+    /// `longest` [m]. Returns this point and the gradient of the first constraint there; `None` if it is not
+    /// found.
     pub(crate) fn project(&self, sides: Sides, from: &Vector3, longest: f64) -> Option<(Vector3, Vector3)> {
         let mut point = *from;
         for _ in 0..12 {
@@ -168,7 +168,7 @@ impl Constraints {
         self.values[..self.count].iter().fold(0.0, |largest, value| largest.max(value.abs()))
     }
 
-    /// The gradient of the first of them: of the body on its boundary.
+    /// Gradient of the first constraint: on the boundary, the gradient of the body's field.
     pub(crate) fn first_gradient(&self) -> Vector3 {
         self.gradients[0]
     }
@@ -182,7 +182,7 @@ impl Constraints {
             2 => {
                 let (aa, ab, bb) = (a.norm_squared(), a.dot(b), b.norm_squared());
                 let determinant = aa * bb - ab * ab;
-                // Surfaces that meet at less than 0.6° have no line to speak of.
+                // Surfaces that meet at less than 0.6° have no usable line.
                 (determinant > 1e-4 * aa * bb)
                     .then(|| a * ((bb * p - ab * q) / determinant) + b * ((aa * q - ab * p) / determinant))
             }

@@ -9,7 +9,7 @@ use crate::report::deviation::Deviation;
 use crate::report::regions::Regions;
 use crate::tets::missed::Missed;
 
-/// What there is to know of how a mesh differs from its anatomy.
+/// Differences between a mesh and its anatomy.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Assessment {
     /// Distances between its boundary and the surface of the body as it was given.
@@ -21,7 +21,7 @@ pub struct Assessment {
 }
 
 impl Assessment {
-    /// Of a mesh with cells of `edge` [m].
+    /// Assesses a mesh with cells of `edge` [m].
     ///
     /// # Errors
     /// If the box of the body is empty or not finite.

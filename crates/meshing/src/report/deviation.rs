@@ -16,7 +16,7 @@ use crate::report::hausdorff::{Sample, distance};
 use crate::report::percentiles::Percentiles;
 use crate::tets::topology::faces_between_labels;
 
-/// Samples of the field along the longest side of its box at most.
+/// Most samples of the field along the longest side of its box.
 const MOST_SAMPLES: f64 = 160.0;
 
 /// Steps of Newton's method to the surface.
@@ -149,8 +149,8 @@ impl Measured {
 }
 
 impl Deviation {
-    /// Measures a mesh with cells of `edge` [m] against its input: the triangles of a file, the voxel faces
-    /// of an image, or the field of a function. Samples are at most a quarter of an edge apart.
+    /// Measures a mesh with cells of `edge` [m] against its input. The input is the triangles of a file, the
+    /// voxel faces of an image, or the field of a function. Samples are at most a quarter of an edge apart.
     ///
     /// # Errors
     /// If the box of the field is empty or not finite.
@@ -164,7 +164,7 @@ impl Deviation {
     }
 
     /// Measures a mesh against a field. The surface is sampled at its intersections with a grid of a quarter
-    /// of `edge` [m], at least a 160th of the box: thinner parts may be missed.
+    /// of `edge` [m], at least a 160th of the box. Thinner parts may be missed.
     ///
     /// # Errors
     /// If the box of the field is empty or not finite.
@@ -172,8 +172,8 @@ impl Deviation {
         Ok(Measured::to_field(mesh, field, edge)?.deviation())
     }
 
-    /// Between the triangles of a mesh and of its input with chosen sides, with samples at most `spacing` [m]
-    /// apart; `None` if one of them has none.
+    /// Distances between the triangles of a mesh and of its input with chosen sides, with samples at most
+    /// `spacing` [m] apart. `None` if either has no such triangles.
     pub(crate) fn between(
         mesh: &Patches,
         given: &Patches,
@@ -241,7 +241,7 @@ impl Near {
         Self { points, cubes, edge }
     }
 
-    /// Distance to the nearest of them [m]; infinite without any.
+    /// Distance to the nearest point [m]; infinite without any.
     fn distance(&self, from: &Vector3) -> f64 {
         let own = cube(from, self.edge);
         let near = (0..27).map(|at| [own[0] + at % 3 - 1, own[1] + at / 3 % 3 - 1, own[2] + at / 9 - 1]);
@@ -294,7 +294,7 @@ pub(crate) fn sample_step(field: &(impl ImplicitField + ?Sized), edge: f64) -> R
     Ok((edge / SAMPLES_PER_EDGE).max((high - low).amax() / MOST_SAMPLES))
 }
 
-/// Where the zero surface crosses the edges of a grid over a box.
+/// Points where the zero surface crosses the edges of a grid over a box.
 fn crossings(
     field: &(impl ImplicitField + ?Sized),
     low: &Vector3,

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use crate::surface::triangles::TriangleMesh;
 
-/// Samples along an edge at most.
+/// Most samples along an edge.
 const MOST_ALONG: usize = 64;
 
 /// Distances between two surfaces [m]: from the first to the second, and back.
@@ -39,8 +39,8 @@ impl Hausdorff {
         Self::with_places(first, second, spacing).0
     }
 
-    /// The same, and the points of the first and of the second surface [m] that are farthest from the other
-    /// one.
+    /// Returns the distances, and the points of the first and of the second surface [m] that are farthest
+    /// from the other surface.
     pub fn with_places(first: &TriangleMesh, second: &TriangleMesh, spacing: f64) -> (Self, [[f64; 3]; 2]) {
         let one_way = |from: &TriangleMesh, to: &TriangleMesh| {
             let locator = locator(to);

@@ -1,4 +1,4 @@
-//! How far a mesh is from its body.
+//! Distances of a mesh from its body.
 
 pub(crate) mod assessment;
 pub(crate) mod deviation;

@@ -1,4 +1,4 @@
-//! How a quantity is spread over an area.
+//! Distribution of a quantity over an area.
 
 use serde::Serialize;
 
@@ -20,7 +20,7 @@ pub struct Percentiles {
 }
 
 impl Percentiles {
-    /// Of values with their weights; `None` without any weight.
+    /// Returns the percentiles of values with weights; `None` without any weight.
     pub fn weighted(mut values: Vec<(f64, f64)>) -> Option<Self> {
         values.retain(|(value, weight)| value.is_finite() && *weight > 0.0);
         values.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));

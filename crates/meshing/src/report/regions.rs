@@ -1,5 +1,5 @@
-//! The labels of a mesh: cells, volume and distances of each, and distances of each interface between two of
-//! them, against the input.
+//! The labels of a mesh: cells, volume and distances of each, and distances of each interface between two
+//! labels, against the input.
 
 use std::collections::BTreeMap;
 
@@ -59,7 +59,7 @@ pub struct Regions {
 }
 
 impl Regions {
-    /// Of a mesh with cells of `edge` [m] of an anatomy.
+    /// Reports the regions of a mesh of an anatomy with cells of `edge` [m].
     pub fn of(mesh: &Mesh, anatomy: &Anatomy<'_>, edge: f64) -> Self {
         let mut found = Self { labels: volumes(mesh, anatomy), interfaces: Vec::new() };
         // Partly filled cubes have no surface of their own.

@@ -1,4 +1,5 @@
-//! Whether the boundary of a mesh bounds a body: its Euler number, and faces that pass through each other.
+//! Checks that the boundary of a mesh bounds a body: its Euler number, and faces that pass through each
+//! other.
 
 use pliant_geometry::{Mesh, Vector3, boundary};
 use serde::Serialize;
@@ -9,21 +10,21 @@ use crate::surface::crossings::crossings;
 use crate::surface::edges::key;
 use crate::surface::isosurface::euler_number_of_field;
 
-/// Whether the boundary of a mesh is that of a body.
+/// Comparison of the boundary of a mesh with the boundary of a body.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct SurfaceCheck {
     /// Euler number of the boundary of the mesh: 2 for each closed surface, less 2 for each handle.
     pub euler_number: i64,
-    /// That of the body's surface, if it is known.
+    /// Euler number of the body's surface, if it is known.
     pub of_body: Option<i64>,
     /// Boundary faces that pass through others, quads as two triangles.
     pub self_intersections: usize,
-    /// Where the first do [m].
+    /// Place of the first intersection [m].
     pub first_crossing: Option<[f64; 3]>,
 }
 
 impl SurfaceCheck {
-    /// Of the boundary of volume cells, or of a mesh of triangles and quads itself.
+    /// Checks the boundary of volume cells, or a mesh of triangles and quads itself.
     pub fn of(mesh: &Mesh) -> Self {
         let faces = boundary(mesh).faces;
         let fan =
@@ -49,7 +50,7 @@ impl SurfaceCheck {
         )
     }
 
-    /// What is wrong with it; `None` where no face passes through another.
+    /// Describes the first intersection of faces; `None` if no face passes through another.
     pub fn doubt(&self) -> Option<String> {
         let [x, y, z] = self.first_crossing?;
         let number = self.self_intersections;

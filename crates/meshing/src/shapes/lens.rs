@@ -1,7 +1,7 @@
 //! An intra-ocular lens as a flat sheet of triangles: the union of a disc, the optic, and two loops, the
-//! haptics, half a turn apart. A haptic is all within half of its width of a line r(φ) = r₀ + (R − r₀)
-//! S(φ/φ₁), S(t) = t² (3 − 2 t) up to t = 1 and 1 above, on which it leaves the optic and goes round it. A
-//! fine lattice is cut at the outline and meshed anew with even edges.
+//! haptics, half a turn apart. A haptic is all points within half of its width of a line that leaves the
+//! optic and runs round it. This line is r(φ) = r₀ + (R − r₀) S(φ/φ₁), with S(t) = t² (3 − 2 t) up to t = 1
+//! and 1 above. A fine lattice is cut at the outline and meshed anew with even edges.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use crate::error::{MeshingError, require_at_most, require_positive};
 use crate::input::extent::allowed;
 use crate::surface::triangles::TriangleMesh;
 
-/// Parts of an edge that the lattice has which is cut at the outline.
+/// Lattice edges per edge of the mesh, for the lattice that is cut at the outline.
 const FINER: f64 = 6.0;
 /// Nodes of the lattice nearer to the outline than this part of its edge are moved onto it.
 const SNAP: f64 = 0.3;
@@ -24,7 +24,7 @@ const PIECES: usize = 400;
 pub struct Lens {
     /// Diameter of the optic.
     pub optic: f64,
-    /// Diameter of the circle around all of it.
+    /// Diameter of the circle around the whole lens.
     pub overall: f64,
     /// Width of a haptic.
     pub width: f64,
@@ -77,7 +77,7 @@ impl Lens {
         (0..=PIECES).map(at).collect()
     }
 
-    /// How far [m] a point is out of the lens; negative in it.
+    /// Distance of a point from the lens [m]; negative inside.
     fn outside(&self, line: &[Vector3], point: &Vector3) -> f64 {
         let to_line = |point: Vector3| {
             let piece = |ends: &[Vector3]| {
@@ -174,8 +174,8 @@ impl Lens {
         lattice
     }
 
-    /// A point of a lattice of a spacing [m], on the outline if that is near, and how far [m] it is out of
-    /// the lens.
+    /// Moves a point of a lattice of a spacing [m] onto the outline if it is near. Returns the point and its
+    /// distance from the lens [m], negative inside.
     fn snapped(&self, line: &[Vector3], x: Vector3, spacing: f64) -> (Vector3, f64) {
         let out = self.outside(line, &x);
         if out.abs() < SNAP * spacing {
@@ -193,7 +193,7 @@ impl Lens {
 #[derive(Default)]
 struct Lattice {
     points: Vec<Vector3>,
-    /// How far [m] each point is out of the lens.
+    /// Distance of each point from the lens [m]; negative inside.
     outside: Vec<f64>,
     triangles: Vec<[u32; 3]>,
 }
@@ -203,8 +203,8 @@ mod tests {
     use super::*;
     use crate::DEFAULT_CELL_LIMIT;
 
-    /// Area [mm²] and second moments xx, yy, xy [mm⁴] of outlines by the rule of the reference (0.3 % and 0.5
-    /// % with edges of 0.35 mm at most).
+    /// Area [mm²] and second moments xx, yy, xy [mm⁴] of outlines by the rule of the reference. The tolerance
+    /// is 0.3 % and 0.5 % with edges of 0.35 mm at most.
     const DESIGNS: [([f64; 5], [f64; 4]); 3] = [
         ([6.0, 12.5, 0.45, 55.0, 140.0], [40.9839063, 184.296847, 347.799553, 19.0851594]),
         ([5.5, 12.0, 0.45, 55.0, 140.0], [35.9970196, 150.626184, 295.246722, 16.5021854]),

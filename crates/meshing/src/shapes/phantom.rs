@@ -19,7 +19,7 @@ pub enum Organ {
     Liver,
     /// Both hemispheres with sulci 2–3 mm deep and a fissure of about 2 mm; 1.30 l at scale 1.
     Brain,
-    /// The two ventricles inside the brain, which do not meet: a mesh keeps one of them.
+    /// The two ventricles inside the brain, which do not meet: a mesh keeps only one.
     Ventricles,
     /// The tumour inside the brain.
     Tumour,

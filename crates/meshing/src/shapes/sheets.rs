@@ -1,6 +1,6 @@
 //! Triangle meshes of thin bodies on a structured grid: plates, cylinders, hemispheres, annuli, twisted
 //! strips; and spheres by subdivision of an icosahedron. Cells can be split in three patterns and inner
-//! points moved at random, since an element that is right on one regular mesh may be wrong on every other.
+//! points moved at random. An element that is right on one regular mesh may be wrong on every other.
 
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -10,7 +10,7 @@ use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
 use crate::error::{MeshingError, require_at_most, require_positive};
 use crate::input::extent::allowed;
 
-/// How the cells of a grid become triangles.
+/// Division of the cells of a grid into triangles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Pattern {
     /// Two triangles, all diagonals from the start of both axes to their ends.
@@ -160,7 +160,7 @@ impl Sheet {
         }
     }
 
-    /// Whether the first grid axis is closed.
+    /// True if the first grid axis is closed.
     fn closes(&self) -> bool {
         match *self {
             Self::Cylinder { span, .. } | Self::Hemisphere { span, .. } => span > TAU * (1.0 - 1e-12),
@@ -223,8 +223,8 @@ impl Sheet {
     }
 }
 
-/// Gives a mesh the normals of the surface that it is of, unless a triangle leans more than 60° from one of
-/// them, as folded ones do.
+/// Gives a mesh the normals of its smooth surface, unless a triangle leans more than 60° from one of its
+/// normals, as folded triangles do.
 fn add_normals(mesh: &mut Mesh, normals: Vec<Vector3>) {
     let stands = |corners: &[u32]| {
         let [a, b, c] = [0, 1, 2].map(|i| mesh.points[corners[i] as usize]);
@@ -441,8 +441,8 @@ mod tests {
         }
     }
 
-    /// Of 5,120 triangles: area to 1 %, volume outwards to 1 %.
-    /// Within 4° of the triangles on a fine mesh, and to the same side; none of flat sheets.
+    /// Normals are within 4° of the triangles on a fine mesh, and on the same side. Flat sheets have no
+    /// normals.
     #[test]
     fn normals_are_those_of_the_sheet() {
         for (sheet, _) in all() {

@@ -29,7 +29,7 @@ impl VolumeCell {
     }
 }
 
-/// How finely a block is divided.
+/// Number or size of the cells of a block.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Resolution {
     /// About this edge [m]: along each axis the nearest whole number of cells, at least 1.
@@ -97,9 +97,8 @@ pub struct Tube {
 
 impl Tube {
     /// Divides the tube into cells of about `edge` [m] (round it: half way through the wall, an even number,
-    /// at least 6). All points lie in the tube: those of its faces on the circles, the cells between them a
-    /// little inside.
-    /// Its faces are the point sets `inner`, `outer`, `z-min` and `z-max`.
+    /// at least 6). All points lie in the tube. Points of its round faces lie on the circles, and the edges
+    /// between them a little inside. Its faces are the point sets `inner`, `outer`, `z-min` and `z-max`.
     pub fn mesh(&self, edge: f64, cells: VolumeCell, cell_limit: usize) -> Result<Mesh, MeshingError> {
         let Self { inner_radius: inner, outer_radius: outer, length } = *self;
         require_positive("inner radius", inner)?;
@@ -203,8 +202,8 @@ impl Grid {
         })
     }
 
-    /// The mesh with its points where `position` puts fractions of the way along the axes, and the first and
-    /// last points along each axis as named sets.
+    /// Builds the mesh with its points where `position` puts fractions of the way along the axes. The first
+    /// and last points along each axis become named sets.
     fn mesh(
         &self,
         cells: VolumeCell,

@@ -1,7 +1,8 @@
-//! Where shells pass through themselves or each other: small flat pieces of the curved surface, of which an
-//! edge of one pierces the other. No step of the fit makes flat triangles cross, nor curved ones once normals
-//! stand. Curved shells that cross all the same are flattened and halved; at the end what is left is
-//! flattened as long as that helps, then repaired (`repair`). Leaves out: pieces that share an edge.
+//! Crossings of shells with themselves or each other. Shells cross if, among small flat pieces of the curved
+//! surface, an edge of one piece pierces another. No step of the fit makes flat triangles cross, nor curved
+//! ones once normals stand. Curved shells that cross all the same are flattened and halved. At the end the
+//! remaining ones are flattened as long as that helps, then repaired (`repair`). Leaves out: pieces that
+//! share an edge.
 
 use std::collections::BTreeMap;
 
@@ -15,12 +16,11 @@ use super::measure::pieces;
 use crate::report::hausdorff::lattice;
 use crate::surface::crossings::crossing_groups;
 
-/// Parts of an edge between the corners of pieces: while the fit goes on, and at its end if the shells are
-/// few.
+/// Parts of an edge between the corners of pieces: during the fit, and at its end if the shells are few.
 pub(super) const COARSE: usize = 4;
 const FINE: usize = 8;
 
-/// Pieces at most that are looked at in [`FINE`] parts.
+/// Most pieces that are tested with [`FINE`] parts of an edge.
 const MOST_PIECES: usize = 200_000;
 
 /// Steps to undo crossings after the fit, from little to the whole way.
@@ -29,8 +29,8 @@ const STEPS: usize = 5;
 /// Shells that cross others or themselves.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Crossing {
-    /// Pairs of numbers of their triangles, smaller first, increasing. What crosses itself is a pair with
-    /// itself.
+    /// Pairs of numbers of their triangles, smaller first, increasing. A shell that crosses itself is a pair
+    /// with itself.
     pub(super) pairs: Vec<[u32; 2]>,
     /// A point where the first pair meets [m].
     pub(super) place: Option<Vector3>,
@@ -51,20 +51,20 @@ impl Shells {
         self.crossing_of(self.mesh.alive().collect(), self.parts_in_the_end(), |_| true)
     }
 
-    /// Parts of an edge in which all are looked at in the end.
+    /// Parts of an edge in which all shells are tested in the end.
     pub(super) fn parts_in_the_end(&self) -> usize {
         if self.mesh.len() * FINE * FINE <= MOST_PIECES { FINE } else { COARSE }
     }
 
-    /// Shells that cross among those that move and what is near them, looked at in pieces of so many parts of
-    /// an edge.
+    /// Finds shells that cross among the moving shells and their surroundings, tested in pieces of `parts`
+    /// parts of an edge.
     pub(super) fn crossing_near_moving(&self, parts: usize, effort: &mut Effort) -> Vec<u32> {
         let near = self.near(|shell| self.moves(shell));
         effort.search(near.len(), parts * parts);
         self.crossing_of(near, parts, |_| true).shells()
     }
 
-    /// How many pairs cross of which one at least moves, looked at in pieces of so many parts of an edge.
+    /// Number of crossing pairs with at least one moving shell, tested in pieces of `parts` parts of an edge.
     pub(super) fn crossing_with_moving(&self, parts: usize, effort: &mut Effort) -> usize {
         let moves = |shell: u32| self.moves(shell);
         let near = self.near(moves);
@@ -112,8 +112,8 @@ impl Shells {
         Crossing { pairs: pairs.into_iter().map(|pair| pair.map(|at| shells[at as usize])).collect(), place }
     }
 
-    /// The curved surface in flat pieces, those of a shell one after the other. Neighbours share the points
-    /// of their edge.
+    /// Divides the curved surface into flat pieces, one shell after the other. Neighbours share the points of
+    /// their edge.
     fn in_pieces(&self, shells: &[u32], parts: usize) -> (Vec<Vector3>, Vec<[u32; 3]>) {
         let (places, pieces) = (lattice(parts), pieces(parts));
         let mut points = self.mesh.points.clone();
@@ -129,8 +129,8 @@ impl Shells {
         (points, triangles)
     }
 
-    /// Turns normals of shells that cross towards the mean of their flat triangles, which do not cross, as
-    /// far as it takes and as long as fewer do.
+    /// Turns normals of crossing shells towards the mean of their flat triangles, which do not cross. The
+    /// turn grows in steps as long as shells cross, and a step stays if fewer cross.
     pub(super) fn uncross(&mut self, effort: &mut Effort) {
         if self.crossing_near_moving(COARSE, effort).is_empty() {
             return;
@@ -162,7 +162,7 @@ impl Shells {
     }
 }
 
-/// The number of a place of a shell among the points, which it joins if it is new.
+/// Returns the number of a place of a shell among the points. A new place is added.
 fn numbered(
     patch: &CurvedTriangle,
     nodes: [u32; 3],

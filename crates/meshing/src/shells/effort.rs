@@ -1,13 +1,13 @@
-//! How much work a fit may take, counted in searches for the nearest point of the target: the same count, and
-//! the same shells, on every machine with any number of threads. It does not grow with the number of
-//! triangles of the target: points of the target that are looked at have a largest number (`target`), so that
-//! a round costs what its shells cost.
+//! Work that a fit may take, counted in searches for the nearest point of the target. The count, and so the
+//! shells, are the same on every machine with any number of threads. The count does not grow with the number
+//! of triangles of the target: the number of its sampled points is bounded (`target`). So the cost of a round
+//! depends on its shells only.
 
-/// A search for the nearest place of the shells weighs as much as this many for the nearest point of the
-/// target.
+/// Cost of a search for the nearest place of the shells, in searches for the nearest point of the target.
 pub(super) const LANDING: usize = 4;
 
-/// A row of the least-squares step weighs as much. A check of one piece of a shell for crossings weighs 1.
+/// Cost of a row of the least-squares step, in the same unit. A check of one piece of a shell for crossings
+/// costs 1.
 pub(super) const ROW: usize = 4;
 
 /// Work done so far.
@@ -18,22 +18,22 @@ pub(super) struct Effort {
 }
 
 impl Effort {
-    /// Searches of a fit to a distance: 5 to 50 s of one core, by the surface.
+    /// Searches of a fit to a distance: 5 to 50 s of one core, depending on the surface.
     pub(super) const MOST: usize = 12_000_000;
 
-    /// The same to a number of shells, which are exchanged then.
+    /// Searches of a fit to a number of shells, which are exchanged then.
     pub(super) const MOST_TO_A_NUMBER: usize = 32_000_000;
 
     pub(super) fn new(most: usize) -> Self {
         Self { done: 0, most }
     }
 
-    /// The same with at least a part of the whole left.
+    /// Returns the effort with at least a part of the whole left.
     pub(super) fn with_left(self, part: f64) -> Self {
         Self { done: self.done.min(((1.0 - part) * self.most as f64) as usize), ..self }
     }
 
-    /// Adds a number of searches of a weight.
+    /// Adds a number of searches of a cost.
     pub(super) fn search(&mut self, number: usize, weight: usize) {
         self.done = self.done.saturating_add(number * weight);
     }

@@ -1,9 +1,9 @@
-//! Exchange of shells once there are as many as asked for. Where they are farthest off, they are fitted again
-//! by themselves, edges flip or shells are halved; for each that is halved two others collapse, where they
-//! stay close. Each change is tried on a part of the shells (`part`) and stays if the farthest there come
-//! nearer, or if those that collapse stay nearer than the farthest of all. It ends when the farthest come no
-//! nearer, nothing collapses or the work is done. Leaves out: collapses of points of borders, of sharp edges
-//! and of creases.
+//! Exchange of shells once their requested number is reached. The shells that are farthest off are fitted
+//! again by themselves, edges flip or shells are halved. For each halved shell two others collapse, where
+//! they stay close. Each change is tried on a part of the shells (`part`). It stays if the farthest there
+//! come nearer, or if collapsed shells stay nearer than the farthest of all. The exchange ends when the
+//! farthest come no nearer, nothing collapses or the work is done. Leaves out: collapses of points of
+//! borders, of sharp edges and of creases.
 
 use std::collections::BTreeSet;
 
@@ -14,36 +14,37 @@ use super::target::Target;
 use super::{POOR, Shells, worst};
 use crate::surface::edges::key;
 
-/// Where edges collapse, distances stay below this part of the largest.
+/// Distances stay below this part of the largest where edges collapse.
 const SPARE: f64 = 0.75;
 
-/// Collapses tried in a row at most: those left are farther off, and fail as well.
+/// Most collapses tried in a row: the remaining edges are farther off, and fail as well.
 const MOST_COLLAPSES: usize = 30;
 
-/// Shells halved in one part at most until its largest distance falls.
+/// Most shells halved in one part until its largest distance falls.
 const MOST_HALVED: usize = 4;
 
 /// Parts of the largest distance that fits aim at: without more shells, and with some.
 const AIM: f64 = 0.8;
 const AIM_HALVED: f64 = 0.6;
 
-/// A change stays if the largest distance falls below this part of it: without more shells, and with some.
+/// A change stays if the largest distance falls below this part of its old value: without more shells, and
+/// with some.
 const NEARER: f64 = 0.95;
 const NEARER_HALVED: f64 = 0.98;
 
-/// Times that triangles are evened out after there are more or fewer.
+/// Number of times that triangles are evened out after their number changed.
 const EVENED: usize = 3;
 
-/// What may change in a part. Points and shells have their numbers in it.
+/// Change of a part of the shells. Points and shells have their numbers in the part.
 #[derive(Clone, Copy, Debug)]
 enum Change {
-    /// No more than places and normals.
+    /// Only places and normals change.
     Fit,
     /// The edge between two shells turns.
     Flip([u32; 2]),
     /// A shell is halved at its longest edge.
     Halve(u32),
-    /// Two points become the first of them.
+    /// Two points become the first one.
     Collapse([u32; 2]),
 }
 
@@ -82,8 +83,8 @@ impl Part {
         Some(next)
     }
 
-    /// Whether its triangles are no poorer than those before a change, no more points have lost their normals
-    /// and no more shells cross.
+    /// True if a change has not made triangles poorer, taken the normal of any point, or made more shells
+    /// cross.
     fn holds(&self, before: &Self, effort: &mut Effort) -> bool {
         let crossing = |part: &Self, effort: &mut Effort| {
             part.shells.crossing_with_moving(part.shells.parts_in_the_end(), effort)
@@ -129,8 +130,8 @@ struct Exchange<'t> {
 }
 
 impl Shells {
-    /// Exchanges shells as long as the largest distance falls, if there are as many as asked for. `told`
-    /// hears that distance [m].
+    /// Exchanges shells as long as the largest distance falls, if their requested number is reached. `told`
+    /// hears this distance [m].
     pub(super) fn exchange(
         &mut self,
         number: usize,
@@ -158,7 +159,7 @@ impl Shells {
                 break;
             }
         }
-        // Without the shells and points that are gone.
+        // Drop removed shells and points.
         *self = self.part(&self.mesh.alive().collect::<Vec<_>>()).0;
     }
 }
@@ -168,7 +169,7 @@ impl Exchange<'_> {
         part.put_back(&mut self.shells, &mut self.distances);
     }
 
-    /// Brings the farthest shell nearer, whose distance is given [m]: by what takes no more shells, or with
+    /// Brings the farthest shell nearer, whose distance is given [m]: with the same number of shells, or with
     /// more. Returns whether it did.
     fn come_nearer(&mut self, off: f64) -> bool {
         let far = self.distances.far();
@@ -190,7 +191,7 @@ impl Exchange<'_> {
         found.map(|found| self.put_back(found)).is_some()
     }
 
-    /// A part after the change that takes it nearest, if one does enough.
+    /// The part after the change that comes nearest, if one comes near enough.
     fn best_of(&mut self, part: &Part, changes: &[Change], off: f64) -> Option<Part> {
         let mut best: Option<(f64, Part)> = None;
         for &change in changes {
@@ -205,7 +206,7 @@ impl Exchange<'_> {
         best.map(|(_, found)| found)
     }
 
-    /// A part after a shell is halved, and then the farthest there, as often as it takes.
+    /// The part after halving a shell, and then the farthest there, as often as needed.
     fn halved(&mut self, part: &Part, shell: u32, off: f64) -> Option<Part> {
         let (mut found, mut shell) = (part.clone(), shell);
         for _ in 0..MOST_HALVED {
@@ -278,8 +279,8 @@ mod tests {
         }
     }
 
-    /// Even shells on the ball are too large for the knob. Exchanged for as many others they come four times
-    /// nearer, the surface stays closed, and distances are those that are measured anew.
+    /// Even shells on the ball are too large for the knob. After an exchange for as many others they come
+    /// four times nearer. The surface stays closed, and distances equal a new measurement.
     #[test]
     fn shells_go_where_the_surface_bends() {
         let surface = TriangleMesh::of_field(&Knob, 0.001, DEFAULT_CELL_LIMIT).unwrap();
@@ -307,7 +308,7 @@ mod tests {
         assert!(shells.crossing().pairs.is_empty());
     }
 
-    /// Shells of which too few were made are left alone.
+    /// The exchange leaves shells alone if their requested number is not reached.
     #[test]
     fn fewer_shells_than_asked_for_stay() {
         let (ball, _) = TriangleMesh::from_mesh(&sphere(0.02, 1, DEFAULT_CELL_LIMIT).unwrap()).unwrap();

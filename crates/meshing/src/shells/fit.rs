@@ -1,8 +1,8 @@
-//! Fit of shells to a surface: Gauss–Newton for the places and normals of the vertices, with respect to the
+//! Fit of shells to a surface: Gauss–Newton for the places and normals of the vertices. It minimises
 //! distances at places of the shells and at points of the target. Distances count with a high power, so that
-//! the largest falls; each vertex goes only as far as the sum of the powers round it falls, its triangles
-//! keep their shape and the normals stand on them. Vertices of a border stay in place, only their normals
-//! turn.
+//! the largest falls. Each vertex goes only as far as the sum of the powers round it falls. Its triangles
+//! must keep their shape and the normals stand on them. Vertices of a border stay in place; only their
+//! normals turn.
 
 use nalgebra::Matrix3;
 use pliant_geometry::{ControlWeights, CurvedTriangle, EDGES, Vector3};
@@ -19,20 +19,20 @@ use crate::report::hausdorff::lattice;
 /// Parts of an edge between the places of a shell at which it is fitted.
 const PARTS: usize = 5;
 
-/// Points of the target count from this part of the distance asked for.
+/// Points of the target count from this part of the requested distance.
 const CLOSE: f64 = 0.3;
 
-/// Where more than so many points of the target count at one shell, of each of [`BINS`]² parts of it only the
-/// farthest does.
+/// Largest number of points of the target that all count at one shell. If there are more, only the farthest
+/// counts in each of [`BINS`]² parts of the shell.
 const MOST_BACK: usize = 128;
 const BINS: f64 = 11.0;
 
-/// Largest turn of a normal in one step [rad], and way over the mean length of edges.
+/// Largest turn of a normal in one step [rad], and largest move over the mean length of edges.
 const LARGEST_TURN: f64 = 0.3;
 const LARGEST_WAY: f64 = 0.2;
 
-/// What steps of vertices that make things worse are reduced by, try by try, and whether the whole may then
-/// be taken if it is better.
+/// Factors, try by try, on steps of vertices that make things worse, and whether the whole step may then be
+/// taken if it is better.
 const TRIES: [(f64, bool); 8] = [
     (0.4, false),
     (0.4, false),
@@ -47,7 +47,7 @@ const TRIES: [(f64, bool); 8] = [
 /// Normals that need not stand on their triangles are not turned below this cosine, either.
 const LEAST_ALONG: f64 = 0.2;
 
-/// Shells that crossed before a step, flat and curved, where that was asked.
+/// Shells that crossed before a step, flat and curved, if computed.
 type Crossed = [Option<Vec<u32>>; 2];
 
 /// A shell that moves, and the points of the target that count at it.
@@ -122,8 +122,8 @@ impl Shells {
         (0..).zip(&self.mesh.points).map(|(v, x)| self.upright_round(v, x)).collect()
     }
 
-    /// Corners that move of shells that cross others and did not before: of flat triangles, and once normals
-    /// stand of curved ones.
+    /// Moving corners of shells that cross others and did not before: flat triangles, and once normals stand
+    /// also curved ones.
     fn newly_crossed(&self, before: &Self, crossed: &mut Crossed, effort: &mut Effort) -> Vec<usize> {
         let mut nodes = Vec::new();
         for (parts, old) in [1, COARSE].into_iter().zip(crossed).take(if self.strict { 2 } else { 1 }) {
@@ -158,8 +158,7 @@ impl Shells {
         shells.into_iter().map(of).collect()
     }
 
-    /// The sums of the powers of distances after a step. Those of shells that have not changed since they
-    /// were summed stay.
+    /// Sums the powers of distances after a step. Shells that have not changed keep their sums.
     fn sums_again(
         &self,
         moving: &[Moving],
@@ -251,14 +250,14 @@ fn off(patch: &CurvedTriangle, place: [f64; 3], target: &Target) -> (Vector3, f6
     (if off > 1e-9 * target.diagonal { (x - foot) / off } else { normal }, off)
 }
 
-/// The same from one point of the target along a direction that stays.
+/// Returns the direction and the distance [m] for one point of the target, along a direction that stays.
 fn off_along(patch: &CurvedTriangle, landing: &Landing) -> (Vector3, f64) {
     let off = (patch.point(landing.place) - landing.point).dot(&landing.along);
     (off.signum() * landing.along, off.abs())
 }
 
-/// Derivatives of the place with some weights along a direction by each corner and by each normal, from those
-/// of the edges' control points.
+/// Derivatives of a place along a direction by each corner and by each normal, from the derivatives of the
+/// edges' control points.
 fn slopes(
     edges: &[[Matrix3<f64>; 2]; 6],
     (corner, edge): ControlWeights,

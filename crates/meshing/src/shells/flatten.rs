@@ -1,18 +1,17 @@
-//! Shells that do not cross for certain: where they do, one of each two becomes as flat as its triangle. Flat
-//! triangles do not cross, so in the end no shells do. Leaves out: triangles that cross; these stay as they
-//! are.
+//! Shells that certainly do not cross: of two that cross, one becomes as flat as its triangle. Flat triangles
+//! do not cross, so in the end no shells do. Leaves out: triangles that cross; these stay.
 
 use pliant_geometry::Vector3;
 
 use super::Shells;
 use super::target::Target;
 
-/// Times at most that shells are made flat since they are nearer then.
+/// Most rounds in which shells become flat because they are nearer then.
 const TIMES: usize = 6;
 
 impl Shells {
-    /// Makes shells flat until none cross but those whose triangles do: of two that cross the one that bulges
-    /// more. Nothing may change triangles or turn normals afterwards.
+    /// Flattens shells until none cross except where their triangles do. Of two that cross it flattens the
+    /// one that bulges more. Nothing may change triangles or turn normals afterwards.
     pub(super) fn flatten(&mut self) {
         self.flat.resize(self.mesh.triangles.len(), false);
         loop {
@@ -29,8 +28,9 @@ impl Shells {
         }
     }
 
-    /// Makes those shells flat that are farther off than a bound [m], told by the distances of all, and
-    /// nearer as flat triangles, as long as the largest distance falls. Returns whether any are.
+    /// Flattens shells that are farther off than a bound [m] and nearer as flat triangles, as long as the
+    /// largest distance falls. `bound` is computed from the distances of all shells. Returns whether any
+    /// shell was flattened.
     pub(super) fn flatten_nearer(&mut self, target: &Target, bound: impl Fn(&[f64]) -> f64) -> bool {
         let largest = |far: &[f64]| far.iter().copied().fold(0.0, f64::max);
         let flat = Self { flat: vec![true; self.mesh.triangles.len()], ..self.clone() };
@@ -53,7 +53,7 @@ impl Shells {
         is_changed
     }
 
-    /// How far the control points of a shell lie from its triangle at most [m].
+    /// Largest distance of the control points of a shell from its triangle [m].
     fn bulge(&self, shell: u32) -> f64 {
         let patch = self.patch(shell);
         let (start, normal) = (patch.corners()[0], patch.facet_normal());
@@ -61,7 +61,7 @@ impl Shells {
         patch.edge_points().iter().map(off).fold(0.0, f64::max)
     }
 
-    /// Whether a shell is flat.
+    /// True if a shell is flat.
     pub(super) fn is_flat(&self, shell: u32) -> bool {
         self.flat.get(shell as usize).is_some_and(|flat| *flat)
     }
@@ -72,8 +72,8 @@ mod tests {
     use super::*;
     use crate::surface::triangles::TriangleMesh;
 
-    /// Two squares 0.13 apart, of four triangles each, with normals of which the shells of each bulge by 0.08
-    /// towards the other.
+    /// Two squares 0.13 apart, of four triangles each. With these normals the shells of each square bulge by
+    /// 0.08 towards the other.
     fn bulging() -> Shells {
         let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.5, 0.5]];
         let of = |z: f64, lean: f64| {
@@ -97,7 +97,7 @@ mod tests {
         }
     }
 
-    /// No more are flat than one of each two that crossed, and those are exactly their triangles.
+    /// At most one of each two shells that crossed is flat, and flat shells are exactly their triangles.
     #[test]
     fn shells_that_bulge_into_each_other_become_flat() {
         let mut shells = bulging();

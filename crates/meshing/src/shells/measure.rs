@@ -12,17 +12,17 @@ use super::{FittedShells, ShellGoal, Shells};
 use crate::report::hausdorff::{Hausdorff, Sample, distance, lattice, locator, samples, spread};
 use crate::surface::triangles::shape;
 
-/// Parts of an edge of the flat triangles among which the nearest place of the shells is looked for.
+/// Parts of an edge of the flat triangles that start the search for the nearest place of the shells.
 const FACETS: usize = 8;
 
-/// The same with more than so many shells.
+/// Parts of an edge with more than [`MANY`] shells.
 const FEWER_FACETS: usize = 4;
 const MANY: usize = 2000;
 
-/// Steps to the nearest place of a shell from there on.
+/// Steps from there to the nearest place of a shell.
 const STEPS: usize = 10;
 
-/// Where a point of the target is nearest to the shells.
+/// Place on the shells that is nearest to a point of the target.
 #[derive(Clone, Copy)]
 pub(super) struct Landing {
     pub(super) point: Vector3,
@@ -31,23 +31,23 @@ pub(super) struct Landing {
     pub(super) shell: u32,
     pub(super) place: [f64; 3],
     pub(super) off: f64,
-    /// Unit vector from the point to there.
+    /// Unit vector from the point to its nearest place.
     pub(super) along: Vector3,
 }
 
 /// Distances of shells.
 #[derive(Clone)]
 pub(super) struct Distances {
-    /// The largest of each shell from the target, by the number of its triangle [m].
+    /// Largest distance of each shell from the target, by the number of its triangle [m].
     there: Vec<f64>,
-    /// Parts of an edge between the places of a shell that were looked at.
+    /// Parts of an edge between the sampled places of a shell.
     parts: usize,
-    /// Of the points of the target, in their order.
+    /// Nearest places of the points of the target, in the order of these points.
     pub(super) landings: Vec<Landing>,
 }
 
 impl Distances {
-    /// The largest of each shell, by the number of its triangle, both ways [m].
+    /// Largest distance of each shell, both ways, by the number of its triangle [m].
     pub(super) fn far(&self) -> Vec<f64> {
         let mut far = self.there.clone();
         for landing in &self.landings {
@@ -57,8 +57,8 @@ impl Distances {
         far
     }
 
-    /// Those of some shells, increasing, which are numbered anew, and of points of the target that are
-    /// nearest to those that move.
+    /// Returns the distances of some shells, increasing, which are numbered anew, and of the points of the
+    /// target that are nearest to moving shells.
     pub(super) fn part(&self, own: &[u32], moves: impl Fn(u32) -> bool) -> Self {
         let there = own.iter().map(|&t| self.there[t as usize]).collect();
         let landings = self.landings.iter().filter(|landing| moves(landing.shell)).filter_map(|landing| {
@@ -69,8 +69,8 @@ impl Distances {
 }
 
 impl Distances {
-    /// Puts those of a part, whose shells have these numbers here, in the place of those of the shells that
-    /// moved there.
+    /// Replaces the distances of the shells that moved by the distances of a part. `own` holds the numbers of
+    /// the part's shells here.
     pub(super) fn put(&mut self, part: &Self, own: &[u32], moved: impl Fn(u32) -> bool) {
         let count = own.iter().map(|&t| t as usize + 1).fold(self.there.len(), usize::max);
         self.there.resize(count, 0.0);
@@ -81,7 +81,7 @@ impl Distances {
         }
     }
 
-    /// The largest distance of points of the target.
+    /// The largest distance of points of the target from the shells.
     pub(super) fn largest_back(&self) -> f64 {
         self.landings.iter().map(|landing| landing.off).fold(0.0, f64::max)
     }
@@ -94,7 +94,7 @@ impl Shells {
         self.mesh.alive().filter(|&t| self.moves(t)).map(|t| far[t as usize]).fold(0.0, f64::max)
     }
 
-    /// All distances.
+    /// Measures all distances.
     pub(super) fn distances(&self, detail: &Detail, target: &Target) -> Distances {
         let shells: Vec<u32> = self.mesh.alive().collect();
         let mut there = vec![0.0; self.mesh.triangles.len()];
@@ -102,15 +102,15 @@ impl Shells {
         Distances { there, parts: detail.parts, landings: self.landings(shells, detail) }
     }
 
-    /// Where points of the target are nearest to shells.
+    /// Nearest places of the points of the target on some shells.
     fn landings(&self, shells: Vec<u32>, detail: &Detail) -> Vec<Landing> {
         let nearest = Nearest::new(self, shells);
         let spots = detail.samples.par_iter().zip(&detail.normals);
         spots.filter_map(|(sample, normal)| nearest.landing(&sample.point, normal)).collect()
     }
 
-    /// Distances after some shells have moved. Points of the target that were nearest to these are looked for
-    /// on them and their neighbours; others are at most as far off as before.
+    /// Distances after some shells have moved. Points of the target that were nearest to moved shells are
+    /// searched on these shells and their neighbours. All others are at most as far off as before.
     pub(super) fn distances_after(
         &self,
         before: &Distances,
@@ -144,7 +144,7 @@ impl Shells {
         Distances { there, parts: before.parts, landings: before.landings.par_iter().map(again).collect() }
     }
 
-    /// The largest distance of shells from the target.
+    /// Computes the largest distance of each of some shells from the target.
     fn measure(&self, shells: &[u32], parts: usize, target: &Target, there: &mut [f64]) {
         let places = lattice(parts);
         let of = |&t: &u32| {
@@ -159,7 +159,7 @@ impl Shells {
         shells.iter().zip(found).for_each(|(&t, off)| there[t as usize] = off);
     }
 
-    /// Measures all and tells what was found.
+    /// Measures everything and reports the findings.
     pub(super) fn finished(
         &self,
         target: &Target,
@@ -276,13 +276,13 @@ impl Shells {
 
 /// The curved surface in small triangles.
 struct Picture {
-    /// With its distances from the target.
+    /// The triangles, with their distances from the target.
     error_map: Mesh,
-    /// The largest of these and their root mean square [m].
+    /// The largest of these distances and their root mean square [m].
     forward: (f64, f64),
-    /// The largest of each shell [m].
+    /// The largest distance of each shell [m].
     far: Vec<f64>,
-    /// Where it is farthest off [m].
+    /// Place of the largest distance [m].
     farthest: Vector3,
 }
 
@@ -302,7 +302,7 @@ pub(super) fn pieces(n: usize) -> Vec<[u32; 3]> {
     found
 }
 
-/// Finds the nearest place of all shells, from small flat triangles on.
+/// Search for the nearest place of all shells, which starts from small flat triangles.
 struct Nearest {
     patches: Vec<CurvedTriangle>,
     triangles: Vec<u32>,
@@ -328,14 +328,13 @@ impl Nearest {
         Self { patches, triangles, locator: SurfaceLocator::new(&surface, &faces, &mesh.points), places }
     }
 
-    /// The nearest place of the shells.
-    /// The shell, the place on it and the distance [m] that are nearest to a point.
+    /// Returns the shell, the place on it and the distance [m] that are nearest to a point.
     fn nearest(&self, point: &Vector3) -> Option<(usize, [f64; 3], f64)> {
         Some(self.refined_from(point, self.locator.closest(point)?))
     }
 
-    /// The same, of what looks the same way as the target. What looks the other way counts if nothing else is
-    /// near, as measured by the size of a shell.
+    /// Returns the nearest place that looks the same way as the target. A place that looks the other way
+    /// counts if nothing else is near, relative to the size of a shell.
     fn landing(&self, point: &Vector3, normal: &Vector3) -> Option<Landing> {
         let (mut shell, mut place, mut off) = self.nearest(point)?;
         let patch = &self.patches[shell];

@@ -1,15 +1,15 @@
 //! A fine surface by few curved shells: cubic Bézier triangles ([`CurvedTriangle`]) whose vertices and
-//! normals are fitted to it. A decimated surface starts; then, round by round, the shells that are too far
-//! off, either way, are halved at their longest edges, and round them triangles are evened out and fitted
-//! again, while the others rest. What is reached is looked at more closely before it counts. Normals stand
+//! normals are fitted to it. The fit starts from a decimated surface. Round by round, shells that are too far
+//! off, either way, are halved at their longest edges. The triangles round them are evened out and fitted
+//! again, while the others rest. Before a goal counts as reached, it is measured more closely. Normals stand
 //! within 60° of their triangles and shells do not pass through each other: where they would, they are
-//! halved, too. As many shells as asked for come nearer by exchange (`exchange`): some collapse where the
-//! surface is flat, and others are halved elsewhere. What crosses in the end is repaired (`repair`), and of
-//! what is left shells become flat (`flatten`). Where a fit fails, it starts again from finer triangles, and
-//! where even flat triangles cross from some that never did (`start`). The work is bounded, by a count that
-//! is the same on every machine; what was closest by then is the result. Sharp edges of the surface stay
-//! (`sharp`). Where flat triangles are nearer than curved ones, they are flat. Leaves out: edges that bend
-//! more than their end normals tell.
+//! halved, too. A requested number of shells comes nearer by exchange (`exchange`): some collapse where the
+//! surface is flat, and others are halved elsewhere. Crossings at the end are repaired (`repair`), and shells
+//! that still cross become flat (`flatten`). Where a fit fails, it starts again from finer triangles. Where
+//! even flat triangles cross, it starts from some that never did (`start`). The work is bounded, by a count
+//! that is the same on every machine; the closest shells by then are the result. Sharp edges of the surface
+//! stay (`sharp`). Where flat triangles are nearer than curved ones, they are flat. Leaves out: edges that
+//! bend more than their end normals show.
 
 mod crossing;
 mod effort;
@@ -39,113 +39,115 @@ pub use report::{Flaw, ShellReport};
 use start::{Starts, UNCROSSED};
 use target::Target;
 
-/// Rounds after an error is reached, where distances can fall or triangles are poor.
+/// Rounds after the requested error is reached, if distances can fall or triangles are poor.
 const LAST_ROUNDS: usize = 4;
 
-/// Rounds of refinement at most.
+/// Most rounds of refinement.
 const MOST_ROUNDS: usize = 40;
 
 /// No step of the fit leaves a triangle of a worse shape, unless it was worse before.
 const LEAST_SHAPE: f64 = 0.65;
 
-/// Among the last rounds those without a triangle worse than this come first.
+/// Among the last rounds, those without a triangle of a worse shape come first.
 const POOR: f64 = 0.6;
 
-/// Part of the way to the goal after which distances are looked at closely.
+/// Part of the way to the goal after which distances are measured closely.
 const CLOSELY: f64 = 0.9;
 
 /// Part of the way to the goal after which normals stand on their triangles.
 const UPRIGHT_FROM: f64 = 0.7;
 
-/// Part of the work allowed after which they do where the goal is farther.
+/// Part of the work allowed after which normals stand on their triangles, even if the goal is farther.
 const UPRIGHT_AFTER: f64 = 0.6;
 
-/// Rounds more in which shells are mended that cross or have a crease.
+/// Additional rounds in which shells that cross or have a crease are mended.
 const MENDING_ROUNDS: usize = 4;
 
-/// Shells with creases or crossings are halved down to edges of this part of the diagonal, or of the error
-/// asked for.
+/// Shells with creases or crossings are halved down to edges of this part of the diagonal, or of the
+/// requested error.
 const LEAST_EDGE: f64 = 1e-3;
 
-/// Part of the work allowed after which a fit is given up that is not [`UPRIGHT_FROM`] of the way and has not
-/// come this much nearer in so many rounds, if there are finer triangles to start from.
+/// Limits after which a fit is given up if there are finer triangles to start from. It has used more than
+/// this part of the work allowed and has not come [`UPRIGHT_FROM`] of the way. Nor has it come nearer by this
+/// factor in this many rounds.
 const GIVEN_UP: f64 = 0.5;
 const NEARER: f64 = 1.05;
 const STUCK: usize = 3;
 
-/// Part of the work allowed that a second fit has at least.
+/// Least part of the work allowed that a second fit has.
 const AGAIN: f64 = 0.5;
 
 /// Least shape of shells that keep sharp edges. If one is slimmer, shells without sharp edges are fitted,
-/// too, and are the result unless their distance is larger by more than the factor below. Rims of images have
-/// more corners than few shells can follow.
+/// too. They are the result unless their distance is larger by more than the factor below. Rims of images
+/// have more corners than few shells can follow.
 const SLIM: f64 = 0.3;
 const MUCH: f64 = 2.0;
 
-/// Part of the work allowed that is left for the exchange of shells, at least.
+/// Least part of the work allowed that is left for the exchange of shells.
 const EXCHANGE: f64 = 0.25;
 
-/// So many shells are fitted once a round, fewer up to four times.
+/// Number of shells that are fitted once a round; fewer are fitted up to four times.
 const MANY: usize = 3000;
 
-/// When the shells are good enough.
+/// Condition that ends a fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ShellGoal {
-    /// When both ways no distance is above this part of the diagonal of the target's box.
+    /// Largest distance, both ways, as a part of the diagonal of the target's box.
     Error(f64),
-    /// At this many shells, or one fewer, as close as the work allowed makes them.
+    /// Number of shells, or one fewer, as close as the work allowed makes them.
     Shells(usize),
 }
 
 /// Curved shells fitted to a surface.
 #[derive(Clone, Debug)]
 pub struct FittedShells {
-    /// Triangles with the unit normals of their nodes as point data `normal` and the largest distance of each
-    /// shell [m], both ways, as cell data `distance`. Where some shells are as flat as their triangles, cell
-    /// data `flat` is 1 there and 0 elsewhere.
+    /// Triangles with their data. Point data `normal` holds the unit normals of the nodes, cell data
+    /// `distance` the largest distance of each shell [m], both ways. Where some shells are as flat as their
+    /// triangles, cell data `flat` is 1 there and 0 elsewhere.
     pub mesh: Mesh,
     /// The curved surface in small flat triangles, with its distance from the target as point data `distance`
     /// [m].
     pub error_map: Mesh,
-    /// What was measured.
+    /// The measurements.
     pub report: ShellReport,
 }
 
-/// Shells in the making.
+/// Shells during a fit.
 #[derive(Clone)]
 struct Shells {
     mesh: TriangleMesh,
     normals: Vec<Vector3>,
     /// Points of borders, which stay there.
     on_border: Vec<bool>,
-    /// Points that may move: those near what has changed. The others keep what was fitted.
+    /// Points that may move: those near changes. The others keep their fit.
     active: Vec<bool>,
-    /// Whether normals must stand on their triangles. On the way to the goal, while triangles are large, they
+    /// True if normals must stand on their triangles. On the way to the goal, while triangles are large, they
     /// need not: points that are held back then do not find their places.
     strict: bool,
     /// Points where no normal stands on all triangles, and points of sharp edges.
     creased: Vec<bool>,
     /// Points of sharp edges of the target, which stay there.
     sharp: Vec<bool>,
-    /// Shells that are as flat as their triangles, by the numbers of these; empty if there are none.
+    /// True for each shell that is as flat as its triangle, by the numbers of the triangles; empty without
+    /// flat shells.
     flat: Vec<bool>,
 }
 
-/// How far a fit has come.
+/// Progress of a fit.
 #[derive(Clone, Copy, Debug)]
 pub struct FitProgress {
-    /// From 0 to 1: of the way to the goal or of the work allowed, whichever is more.
+    /// Fraction from 0 to 1 of the way to the goal or of the work allowed, whichever is more.
     pub part: f64,
     /// Round of refinement.
     pub round: usize,
     /// Shells so far.
     pub shells: usize,
-    /// Their largest distance as a part of the diagonal.
+    /// Largest distance of the shells as a part of the diagonal.
     pub off: f64,
 }
 
 impl FittedShells {
-    /// Fits shells to a surface. `progress` hears how far it has come.
+    /// Fits shells to a surface. `progress` hears the progress.
     pub fn new(
         target: &TriangleMesh,
         goal: ShellGoal,
@@ -164,8 +166,8 @@ impl FittedShells {
         Ok(Self::within(target, goal, Effort::new(most), UNCROSSED, progress))
     }
 
-    /// The same with so much work for each of two attempts. In the first, collapses may make more than
-    /// `uncrossed` triangles cross.
+    /// Fits shells with a limit on the work of each of two attempts. In the first attempt, collapses may make
+    /// triangles cross while there are more than `uncrossed`.
     fn within(
         surface: &TriangleMesh,
         goal: ShellGoal,
@@ -210,7 +212,7 @@ impl FittedShells {
         first.better(attempt(usize::MAX))
     }
 
-    /// Fits the shells of given triangles to a surface, without changing which points they join.
+    /// Fits the shells of given triangles to a surface. The triangles keep their points.
     pub fn on(target: &TriangleMesh, triangles: &TriangleMesh) -> Self {
         let target = Target::new(target);
         let mut shells = Shells::new(triangles, &target);
@@ -224,20 +226,20 @@ impl FittedShells {
     }
 }
 
-/// Shells that were found, and what there is to know about them.
+/// Shells that were found, and their report.
 struct Found {
     shells: Shells,
     fitted: FittedShells,
 }
 
 impl Found {
-    /// The one that crosses less, reaches its goal, or is closer.
+    /// Returns the result that crosses less, reaches its goal, or is closer.
     fn better(self, other: Self) -> Self {
         if other.fitted.report.rank() < self.fitted.report.rank() { other } else { self }
     }
 }
 
-/// What is to be fitted, and who hears how far it has come.
+/// Target and goal of a fit, and the listener to its progress.
 #[derive(Clone, Copy)]
 struct Job<'t> {
     target: &'t Target,
@@ -246,8 +248,8 @@ struct Job<'t> {
 }
 
 impl Job<'_> {
-    /// Fits from few triangles, if that fails from finer ones, and if shells still cross takes those that it
-    /// started from.
+    /// Fits from few triangles. If that fails, it fits from finer ones. If shells still cross, it takes the
+    /// shells that the fit started from.
     fn attempt(&self, starts: &Starts, effort: Effort) -> Found {
         let fit = |mesh, effort, is_last| Fit::new(self.target, mesh, self.goal, effort, is_last);
         if starts.is_lost {
@@ -282,7 +284,7 @@ impl Job<'_> {
 }
 
 impl Job<'_> {
-    /// Shells that are farther off than the error asked for, or than most, are flat where that is nearer.
+    /// Flattens shells that are farther off than the requested error, or than most, where that is nearer.
     fn flat_where_nearer(&self, found: Found) -> Found {
         let mut shells = found.shells.clone();
         let report = &found.fitted.report;
@@ -297,40 +299,40 @@ impl Job<'_> {
     }
 }
 
-/// A fit on its way.
+/// State of a fit.
 struct Fit<'t> {
     target: &'t Target,
     goal: ShellGoal,
-    /// The distance asked for [m]; 0 where a number of shells is.
+    /// The requested distance [m]; 0 if a number of shells is requested.
     aim: f64,
     shells: Shells,
     rounds: usize,
     effort: Effort,
-    /// Whether distances are looked at closely.
+    /// True if distances are measured closely.
     closely: bool,
     best: Option<(Rank, Shells)>,
     /// The largest part of the goal so far, and the round that reached it.
     nearest: (f64, usize),
-    /// Rounds that are left once the goal is reached, and those to mend shells in.
+    /// Rounds that are left once the goal is reached, and rounds that are left for mending.
     left: usize,
     mending: usize,
-    /// Whether nothing else is tried if it fails.
+    /// True if nothing else is tried after a failure.
     is_last: bool,
 }
 
-/// How a fit ends.
+/// Reason for the end of a fit.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum End {
     /// More rounds do not help.
     Done,
-    /// It comes no nearer, and another one can.
+    /// The fit comes no nearer, and another one can.
     GivenUp,
-    /// After all rounds, or all the work allowed.
+    /// No rounds are left, or no work allowed is left.
     Spent,
 }
 
-/// How good shells are; the least is best. Whether the goal is missed, how many shells cross or have creases,
-/// whether triangles are poor, and what is to be small.
+/// Rank of shells; the least is best. True if the goal is missed, number of shells that cross or have
+/// creases, true if triangles are poor, and the quantity to minimise.
 type Rank = (bool, usize, bool, f64);
 
 impl<'t> Fit<'t> {
@@ -357,7 +359,7 @@ impl<'t> Fit<'t> {
         }
     }
 
-    /// The shells of the triangles that it starts from, which do not cross, with the normals of the target.
+    /// The shells of the initial triangles, which do not cross, with the normals of the target.
     fn unfitted(mut self) -> Found {
         self.shells.require_upright();
         self.shells.uncross(&mut self.effort);
@@ -366,7 +368,7 @@ impl<'t> Fit<'t> {
         Found { shells: self.shells, fitted }
     }
 
-    /// Fits as long as it helps. Returns the shells, and the work done so far.
+    /// Fits as long as that helps. Returns the shells, and the work done so far.
     fn run(mut self, progress: &dyn Fn(FitProgress)) -> (Found, Effort) {
         let target = self.target;
         self.shells.even_out(target, 10, &mut self.effort);
@@ -405,7 +407,8 @@ impl<'t> Fit<'t> {
         self.end(End::Spent, progress)
     }
 
-    /// Whether it is given up, since it comes no nearer; takes note of the part of the goal that is reached.
+    /// True if the fit is to be given up because it comes no nearer. Records the part of the goal that is
+    /// reached.
     fn is_stuck(&mut self, part: f64) -> bool {
         if part > NEARER * self.nearest.0 {
             self.nearest = (part, self.rounds);
@@ -415,12 +418,12 @@ impl<'t> Fit<'t> {
         !self.is_last && stays && self.effort.part() > GIVEN_UP
     }
 
-    /// Makes normals stand on their triangles, or looks at distances closely, where it is time for that; the
-    /// distances then.
+    /// Makes normals stand on their triangles, or measures distances closely, once the fit is far enough.
+    /// Returns the new distances.
     fn measured_anew(&mut self, part: f64, bound: f64) -> Option<Distances> {
         let target = self.target;
         let detail = if !self.shells.strict && (part >= UPRIGHT_FROM || self.effort.part() >= UPRIGHT_AFTER) {
-            // Those before may cross.
+            // Earlier shells may cross.
             self.best = None;
             self.shells.require_upright();
             self.shells.uncross(&mut self.effort);
@@ -437,13 +440,13 @@ impl<'t> Fit<'t> {
         Some(now)
     }
 
-    /// Keeps the shells if they are the best so far. Those to be halved for what is wrong with them; `None`
-    /// where no round helps any more.
+    /// Keeps the shells if they are the best so far. Returns the shells to be halved because of a flaw;
+    /// `None` if no further round helps.
     fn flawed(&mut self, far: &[f64], part: f64) -> Option<Vec<u32>> {
         let [creased, crossing] = if self.shells.strict { self.flaws() } else { Default::default() };
         let rank = self.rank(far, part, creased.len() + crossing.len());
-        // Halving what has a crease helps where a fold is wide enough for smaller shells, and not where it is
-        // sharp.
+        // Halving shells with a crease helps where a fold is wide enough for smaller shells, and not where it
+        // is sharp.
         let fewer = self.best.as_ref().is_none_or(|(best, _)| best.0 || rank.1 < best.1);
         let mut flawed = crossing;
         flawed.extend(creased.into_iter().filter(|_| fewer && part >= 1.0));
@@ -454,7 +457,7 @@ impl<'t> Fit<'t> {
             return Some(flawed);
         }
         let mends = !flawed.is_empty() && self.mending > 0;
-        // As many as asked for come nearer by exchange.
+        // A requested number of shells comes nearer by exchange.
         let is_near = match self.goal {
             ShellGoal::Error(_) => !rank.2 && rank.3 <= self.aim,
             ShellGoal::Shells(_) => true,
@@ -467,7 +470,7 @@ impl<'t> Fit<'t> {
         Some(flawed)
     }
 
-    /// The best shells so far, exchanged and repaired unless it is given up, and the work done.
+    /// Returns the best shells so far, exchanged and repaired unless the fit is given up, and the work done.
     fn end(mut self, end: End, progress: &dyn Fn(FitProgress)) -> (Found, Effort) {
         let target = self.target;
         let mut shells = self.best.map_or(self.shells, |(_, best)| best);
@@ -489,7 +492,8 @@ impl<'t> Fit<'t> {
         (Found { shells, fitted }, self.effort)
     }
 
-    /// How much of the goal is reached, the distance above which shells are halved [m], and how many may be.
+    /// Part of the goal that is reached, distance above which shells are halved [m], and number of shells
+    /// that may be halved.
     fn bounds(&self, far: &[f64]) -> (f64, f64, usize) {
         let count = self.shells.mesh.len();
         match self.goal {
@@ -526,7 +530,7 @@ impl<'t> Fit<'t> {
         [mesh.alive().filter(creased).collect(), self.shells.crossing().shells()]
     }
 
-    /// Whether halving a shell may mend it.
+    /// True if halving a shell may mend it.
     fn is_long(&self, shell: u32) -> bool {
         let x = self.shells.mesh.corners(shell);
         let longest = (0..3).map(|k| (x[(k + 1) % 3] - x[k]).norm()).fold(0.0, f64::max);
@@ -538,8 +542,8 @@ fn worst(far: &[f64]) -> f64 {
     far.iter().copied().fold(0.0, f64::max)
 }
 
-/// The distance above which shells are halved on the way to a number of them: six tenths of the worst, or so
-/// many that there are a twentieth more.
+/// The distance above which shells are halved on the way to a requested number. It is six tenths of the
+/// worst, or less if that halves fewer than a twentieth of the shells.
 fn share(far: &[f64]) -> f64 {
     let mut sorted = far.to_vec();
     sorted.sort_unstable_by(|a, b| b.total_cmp(a));
@@ -618,7 +622,7 @@ impl Shells {
         CurvedTriangle::new(self.mesh.corners(triangle), [a, b, c], [ab, ba, bc, cb, ca, ac], EdgeRule::Arc)
     }
 
-    /// Whether a corner of a shell may move, or the shell is gone.
+    /// True if a corner of a shell may move, or the shell is gone.
     fn moves(&self, shell: u32) -> bool {
         !self.mesh.exists(shell)
             || self.mesh.triangles[shell as usize].iter().any(|&n| self.active[n as usize])
@@ -629,7 +633,7 @@ impl Shells {
         self.mesh.alive().filter(|&t| self.moves(t)).count()
     }
 
-    /// Fits until all distances are within `aim` [m], or they fall no more.
+    /// Fits until all distances are within `aim` [m], or they stop falling.
     fn settle(
         &mut self,
         mut now: Distances,

@@ -1,10 +1,10 @@
-//! Some shells cut out of the whole. A change of a few points is tried on what is near them only, so it costs
-//! no more on a large organ.
+//! Some shells cut out of the whole. A change of a few points is tried on their surroundings only, so it
+//! costs no more on a large organ.
 
 use super::Shells;
 use super::measure::Distances;
 
-/// The shells that some points may change, and what is near.
+/// The shells that some points may change, and their surroundings.
 #[derive(Clone)]
 pub(super) struct Part {
     pub(super) shells: Shells,
@@ -40,8 +40,7 @@ impl Part {
         Some(self.own.binary_search(&shell).ok()? as u32)
     }
 
-    /// Puts the part, which has changed, in its place in the whole, which has not changed since the part was
-    /// cut out.
+    /// Puts the changed part in its place in the whole, which has not changed since the part was cut out.
     pub(super) fn put_back(self, whole: &mut Shells, distances: &mut Distances) {
         let Self { shells, distances: found, mut own, mut nodes } = self;
         let moved: Vec<bool> = (0..whole.mesh.triangles.len() as u32).map(|t| whole.moves(t)).collect();

@@ -8,7 +8,7 @@ use super::target::Target;
 use super::{LEAST_SHAPE, Shells};
 use crate::surface::triangles::{cross, shape};
 
-/// Triangles of a better shape than this are left alone by moves that would make them worse.
+/// Shape above which moves may make a triangle worse.
 const GOOD_SHAPE: f64 = 0.75;
 
 /// Triangles are worth less where the cosine to the normal of a corner is below this.
@@ -17,7 +17,7 @@ const ALONG: f64 = 0.3;
 /// Points nearer to each other than this part of the diagonal coincide.
 const COINCIDING: f64 = 1e-9;
 
-/// Triangles after a collapse are of no worse shape, before they are evened out.
+/// Least shape of triangles after a collapse, before they are evened out.
 const LEAST_COLLAPSED: f64 = 0.3;
 
 /// Searches to move a point along the target.
@@ -37,7 +37,7 @@ impl Shells {
         self.stand(point);
     }
 
-    /// The nearest place of the target for a point that moves, on the side where its triangles look.
+    /// The nearest place of the target for a moving point, on the side that its triangles look to.
     fn projected(&self, point: u32, to: &Vector3, facing: &Vector3, target: &Target) -> Vector3 {
         if self.mesh.marked(point).len() > 2 {
             *to
@@ -55,7 +55,7 @@ impl Shells {
         around.iter().map(|&n| (self.mesh.points[n as usize] - here).norm()).fold(f64::INFINITY, f64::min)
     }
 
-    /// Puts the points of borders on those of the target. Decimation leaves them beside it, and neither
+    /// Puts the points of borders on the borders of the target. Decimation leaves them near, and neither
     /// evening out nor the fit need move them.
     pub(super) fn place_border(&mut self, target: &Target) {
         for point in 0..self.mesh.points.len() as u32 {
@@ -101,13 +101,13 @@ impl Shells {
         nodes.map(|n| self.mesh.points[n as usize])
     }
 
-    /// The least cosine between the normal of a triangle and those of its corners.
+    /// The least cosine between the normal of a triangle and the normals of its corners.
     fn stands(&self, nodes: [u32; 3], x: [Vector3; 3]) -> f64 {
         self.along(nodes, &cross(x).try_normalize(0.0).unwrap_or_default())
     }
 
-    /// The shape of a triangle, less where it does not look along the normals of its corners, down to 0 where
-    /// it stands across them.
+    /// The shape of a triangle, reduced where its normal leans from the normals of its corners, down to 0 at
+    /// a right angle.
     fn worth(&self, nodes: [u32; 3], x: [Vector3; 3]) -> f64 {
         shape(x) * (self.stands(nodes, x) / ALONG).clamp(0.0, 1.0)
     }
@@ -117,7 +117,8 @@ impl Shells {
         self.least_round(point, position, |nodes, x| self.worth(nodes, x))
     }
 
-    /// Least cosine between them and the normals of their corners.
+    /// Least cosine between the triangles round a point, were it at a position, and the normals of their
+    /// corners.
     pub(super) fn upright_round(&self, point: u32, position: &Vector3) -> f64 {
         self.least_round(point, position, |nodes, x| self.stands(nodes, x))
     }
@@ -135,8 +136,8 @@ impl Shells {
         self.mesh.star[point as usize].iter().map(of).fold(f64::INFINITY, f64::min)
     }
 
-    /// Moves a point towards evener triangles, as long as no triangle there gets worse than the worst, and
-    /// where they are poor to the best of some places around.
+    /// Moves a point towards evener triangles, as long as no triangle there gets worse than the worst. Where
+    /// triangles are poor, it moves to the best of some places around.
     fn move_along(&mut self, point: u32, target: &Target) {
         let here = self.mesh.points[point as usize];
         if let [a, b] = self.mesh.marked(point)[..]
@@ -180,7 +181,7 @@ impl Shells {
         }
     }
 
-    /// Whether flat triangles round a point cross any.
+    /// True if flat triangles round a point cross any.
     fn is_crossed_round(&self, point: u32) -> bool {
         let star = &self.mesh.star[point as usize];
         let nodes: Vec<[u32; 3]> = star.iter().map(|&t| self.mesh.triangles[t as usize]).collect();
@@ -188,8 +189,8 @@ impl Shells {
     }
 
     /// Halves the shells that are farther off than a bound at their longest edges, the worst first, up to a
-    /// number. They, their neighbours and poor triangles may move from then on. Returns how many edges were
-    /// halved.
+    /// number. These shells, their neighbours and poor triangles may move from then on. Returns how many
+    /// edges were halved.
     pub(super) fn refine(&mut self, far: &[f64], bound: f64, room: usize, target: &Target) -> usize {
         let mut order: Vec<u32> = self.mesh.alive().filter(|&t| far[t as usize] > bound).collect();
         order.sort_by(|&a, &b| far[b as usize].total_cmp(&far[a as usize]));
@@ -246,22 +247,22 @@ impl Shells {
         let middle = 0.5 * (self.mesh.points[a as usize] + self.mesh.points[b as usize]);
         self.place(fresh, target);
         if self.is_crossed_round(fresh) || self.reach(fresh) <= COINCIDING * target.diagonal {
-            // As it was, which crosses nothing new. Points that fall on each other would have no curve
-            // between them.
+            // The unprojected place, which crosses nothing new. Points that fall on each other would have no
+            // curve between them.
             self.mesh.points[fresh as usize] = middle;
             self.stand(fresh);
         }
         fresh
     }
 
-    /// Whether an edge may collapse into its first end: the second is on no border, sharp edge or crease.
+    /// True if an edge may collapse into its first end: the second is on no border, sharp edge or crease.
     pub(super) fn may_collapse(&self, [keep, gone]: [u32; 2]) -> bool {
         !self.on_border[gone as usize] && !self.creased[gone as usize] && self.mesh.may_collapse(keep, gone)
     }
 
-    /// Makes the ends of an edge one, in the middle if the first may move. Returns whether it could:
-    /// triangles keep their sides and some shape, and flat ones do not cross. Otherwise the shells are of no
-    /// more use.
+    /// Joins the ends of an edge, in the middle if the first may move. Returns whether that was possible:
+    /// triangles keep their sides and some shape, and flat ones do not cross. After a failure the shells must
+    /// not be used.
     pub(super) fn collapse(&mut self, [keep, gone]: [u32; 2], target: &Target) -> bool {
         let stays = self.on_border[keep as usize] || self.creased[keep as usize];
         let [here, there] = [keep, gone].map(|n| self.mesh.points[n as usize]);

@@ -1,7 +1,7 @@
 //! Undoing crossings at the end of a fit: corners of shells that cross are turned or moved, as long as fewer
 //! pairs cross. The target does not cross itself, nor do flat triangles close to it. So one aim is the target
-//! with its normals, the other flatter shells. A fit without crossings stays as it is, bit by bit. Leaves
-//! out: knots that no step of this list loosens. The report counts them.
+//! with its normals, the other flatter shells. A fit without crossings stays bit by bit. Leaves out: knots
+//! that no step of this list loosens. The report counts them.
 
 use std::cmp::Reverse;
 
@@ -13,18 +13,18 @@ use super::part::Part;
 use super::target::Target;
 use super::{POOR, Shells};
 
-/// Pieces of shells at most that all tries together look at: about 3 s of one core.
+/// Most pieces of shells that all tries together test: about 3 s of one core.
 const MOST_PIECES_TRIED: usize = 1_000_000;
 
-/// Times at most that corners of crossing shells become creases.
+/// Most times that corners of crossing shells become creases.
 const CREASINGS: usize = 8;
 
-/// Where corners go in a step.
+/// Step of the corners of shells.
 #[derive(Clone, Copy, Debug)]
 enum Step {
     /// Normals turn this part of the way to the mean of the triangles.
     Flatter(f64),
-    /// Normals become those of the target.
+    /// Normals become normals of the target.
     Facing,
     /// Points go this part of the way to the target, with its normals.
     Nearer(f64),
@@ -53,8 +53,8 @@ const STEPS: [Step; 14] = [
     Step::Evener(1.0),
 ];
 
-/// How good a step is; the least is best. Whether it takes shells farther off, how many pairs it parts, and
-/// how far off they are [m].
+/// Rank of a step; the least is best. True if shells come farther off, number of pairs that are parted, and
+/// distance of the shells [m].
 type Rank = (bool, Reverse<usize>, f64);
 
 impl Part {
@@ -138,8 +138,8 @@ impl Shells {
         }
     }
 
-    /// Takes the step of one knot's corners, or of one of them, after which fewer pairs cross. Steps that
-    /// take nothing farther off come first, then those that leave the fewest pairs, then the closest. Returns
+    /// Takes the step of all corners of a knot, or of one corner, after which fewer pairs cross. Steps that
+    /// take nothing farther off come first, then steps that leave the fewest pairs, then the closest. Returns
     /// whether there is one.
     fn loosen(
         &mut self,
@@ -202,7 +202,7 @@ impl Shells {
     }
 }
 
-/// The corners of pairs that hang together by corners, for each such knot increasing.
+/// The corners of crossing pairs that are connected by corners, increasing for each such knot.
 fn knots(shells: &Shells, pairs: &[[u32; 2]]) -> Vec<Vec<u32>> {
     let mut knots: Vec<Vec<u32>> = Vec::new();
     for pair in pairs {

@@ -1,4 +1,4 @@
-//! What there is to know about fitted shells, in words and numbers.
+//! Report on fitted shells, in words and numbers.
 
 use std::fmt;
 
@@ -8,35 +8,35 @@ use serde::Serialize;
 use crate::error::counted;
 use crate::report::hausdorff::Hausdorff;
 
-/// How close shells are to their target, and of what shape.
+/// Distances of shells from their target, and their shape.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ShellReport {
-    /// Shells.
+    /// Number of shells.
     pub shells: usize,
-    /// Their vertices.
+    /// Number of their vertices.
     pub nodes: usize,
     /// Least and mean shape of their flat triangles, 4 √3 A / Σ l²: 1 is equilateral.
     pub shape: [f64; 2],
     /// Distances from the curved shells to the target, and back [m].
     pub distances: Hausdorff,
-    /// Where they are farthest apart [m].
+    /// Place of the largest distance [m].
     pub farthest: [f64; 3],
-    /// The distances of the flat triangles of the vertices.
+    /// Distances of the flat triangles of the vertices from the target, and back [m].
     pub flat: Hausdorff,
     /// Diagonal of the target's box [m].
     pub diagonal: f64,
     /// Rounds of refinement.
     pub rounds: usize,
-    /// The largest distance asked for as a part of the diagonal, where not a number of shells was.
+    /// The requested largest distance as a part of the diagonal; `None` if a number of shells is requested.
     pub asked: Option<f64>,
-    /// Whether the goal was reached.
+    /// True if the goal was reached.
     pub reached: bool,
-    /// Whether the bound on work or on rounds ended the fit short of its goal.
+    /// True if the bound on work or on rounds ended the fit short of its goal.
     pub stopped: bool,
     /// Vertices on sharp edges of the target, where faces meet at more than 45°: they have no normal.
     pub sharp: usize,
     /// Vertices where the surface folds too sharply for a normal within 60° of all triangles, or for curved
-    /// shells that do not cross: they have none, `normal` is zero there.
+    /// shells that do not cross. They have no normal: `normal` is zero there.
     pub creases: Flaw,
     /// Shells that are as flat as their triangles, since curved they would cross others or be farther from
     /// the target.
@@ -45,12 +45,12 @@ pub struct ShellReport {
     pub crossings: Flaw,
 }
 
-/// How often something is not as it should be.
+/// Number and place of occurrences of a flaw.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Flaw {
-    /// How many.
+    /// Number of occurrences.
     pub count: usize,
-    /// Where the first is [m].
+    /// Place of the first one [m].
     pub place: Option<[f64; 3]>,
 }
 
@@ -69,8 +69,8 @@ fn millimetres([x, y, z]: &[f64; 3]) -> String {
 }
 
 impl ShellReport {
-    /// What a user should know before using the shells, in sentences: a goal that was missed, crossings, flat
-    /// shells, creases.
+    /// Warnings for a user of the shells, in sentences: a goal that was missed, crossings, flat shells,
+    /// creases.
     pub fn warnings(&self) -> Vec<String> {
         let missed = (!self.reached).then(|| self.missed());
         let crossings = (self.crossings.count > 0).then(|| {
@@ -101,13 +101,13 @@ impl ShellReport {
         missed.into_iter().chain(crossings).chain(flat).chain(creases).collect()
     }
 
-    /// Whether they cross or miss the goal.
+    /// True if the shells cross or miss the goal.
     pub(super) fn fails(&self) -> bool {
         self.crossings.count > 0 || !self.reached
     }
 
-    /// How bad they are; the least is best. How many cross, whether they miss the goal, and how far off they
-    /// are [m].
+    /// Rank of the shells; the least is best. Number of shells that cross, true if they miss the goal, and
+    /// largest distance [m].
     pub(super) fn rank(&self) -> (usize, bool, f64) {
         (self.crossings.count, !self.reached, self.distances.largest())
     }

@@ -10,15 +10,14 @@ use crate::surface::triangles::TriangleMesh;
 /// normals have creases.
 const SHARP: f64 = std::f64::consts::FRAC_PI_4;
 
-/// Sharp edges that hang together are this long at least, over the diagonal. Shorter ones are noise.
+/// Least length of connected sharp edges, over the diagonal. Shorter ones are noise.
 const LEAST_LENGTH: f64 = 0.05;
 
-/// The faces beside sharp edges meet their other neighbours at angles that are this part of those of the
-/// sharp edges at most, in the mean. At thin edges of organs triangles turn step by step, and such edges are
-/// round.
+/// The faces along sharp edges also meet other neighbours. The mean of the angles there is at most this part
+/// of the mean at the sharp edges. At thin edges of organs triangles turn step by step; such edges are round.
 const BESIDE: f64 = 0.25;
 
-/// Largest part of the surface that is nearer to sharp edges than the error asked for. Steps of voxels take a
+/// Largest part of the surface that is nearer to sharp edges than the requested error. Steps of voxels take a
 /// larger part, and are not sharp edges.
 const MOST_NEAR: f64 = 0.1;
 
@@ -57,8 +56,8 @@ pub(super) fn with_sharp_edges(surface: &TriangleMesh, goal: ShellGoal) -> Optio
     Some(marked)
 }
 
-/// The mean angles [rad] at the sharp edges of each chain, and at the other edges of their faces, by the
-/// first point of the chain.
+/// The mean angles [rad] at the sharp edges of each chain and at the other edges of their faces. The first
+/// point of the chain is the index.
 fn turns_of_chains(marked: &TriangleMesh, edges: &[[u32; 2]], chains: &mut DisjointSets) -> Vec<[f64; 2]> {
     let turn = |[a, b]: [u32; 2]| match marked.sides(a, b) {
         [Some(s), Some(t)] => marked.normal(s).angle(&marked.normal(t)),
@@ -124,7 +123,7 @@ mod tests {
         fitted
     }
 
-    /// A prism of four sides is a box: its shells are flat without being told to, and its corners stay.
+    /// A prism of four sides is a box: its shells are flat without further measures, and its corners stay.
     #[test]
     fn a_box_stays_a_box() {
         let report = fitted(&prism(4, 1), ShellGoal::Error(0.002)).report;

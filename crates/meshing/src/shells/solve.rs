@@ -1,10 +1,10 @@
 //! The damped least-squares step of a fit: (Jᵀ W J + D) δ = −Jᵀ W r by conjugate gradients, Jᵀ W J as one
 //! block for each shell.
 
-/// The power of distances whose sum is made small.
+/// Power of the distances whose sum is minimised.
 pub(super) const POWER: i32 = 6;
 
-/// Unknowns of a vertex: ways along two tangents and the normal, two turns of the normal; all in lengths.
+/// Unknowns of a vertex: moves along two tangents and the normal, two turns of the normal; all in lengths.
 pub(super) const UNKNOWNS: usize = 5;
 
 /// Unknowns of a shell.
@@ -27,7 +27,8 @@ pub(super) struct ShellBlock {
 }
 
 impl ShellBlock {
-    /// Sums rows with weights that make the sum of squares one of powers of distances over `scale` [m].
+    /// Sums rows with weights that turn the sum of squares into a sum of powers of distances over `scale`
+    /// [m].
     pub(super) fn new(nodes: [u32; 3], rows: impl Iterator<Item = Row>, scale: f64) -> Self {
         let mut block = Self { nodes, matrix: [[0.0; ALL]; ALL], right: [0.0; ALL] };
         for row in rows {
@@ -46,7 +47,7 @@ impl ShellBlock {
         block
     }
 
-    /// Where the unknowns of its corners stand among all.
+    /// Indices of the unknowns of its corners among all unknowns.
     fn places(&self) -> [usize; 3] {
         self.nodes.map(|node| UNKNOWNS * node as usize)
     }
@@ -71,7 +72,7 @@ impl ShellBlock {
     }
 }
 
-/// The step of each of a number of points.
+/// Returns the step of each of a number of points.
 pub(super) fn solve(blocks: &[ShellBlock], points: usize) -> Vec<[f64; UNKNOWNS]> {
     let mut diagonal = vec![0.0; UNKNOWNS * points];
     let mut r = vec![0.0; UNKNOWNS * points];

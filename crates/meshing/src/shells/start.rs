@@ -1,6 +1,6 @@
-//! Flat triangles that a fit starts from. Few are best, as long as they have all parts of the surface: what
-//! they have lost, such as a vessel, the fit has to pull out of them again, and shells come to cross on the
-//! way. What fails is tried again from finer ones. Leaves out: whether a part is lost where it is not farther
+//! Flat triangles that a fit starts from. Few are best, as long as they have all parts of the surface. If a
+//! part such as a vessel is lost, the fit has to pull it out again, and shells may cross on the way. A fit
+//! that fails starts again from finer triangles. Leaves out: whether a part is lost where it is not farther
 //! off than half an edge.
 
 use rayon::prelude::*;
@@ -10,37 +10,39 @@ use super::target::Target;
 use crate::report::hausdorff::{distance, locator};
 use crate::surface::triangles::TriangleMesh;
 
-/// Shells to start from where an error is asked for.
+/// Shells to start from if an error is requested.
 const START: usize = 100;
 
-/// Doublings of their number at most.
+/// Most doublings of their number.
 const DOUBLINGS: u32 = 7;
 
 /// Parts are lost where a point of the target is farther from the flat triangles than this part of their mean
 /// edge.
 const LOST: f64 = 0.5;
 
-/// Triangles after a fit that has failed are not farther from the target than this times the error asked for,
-/// and those in place of triangles that have lost parts nearer: parts that are narrow for their shells hardly
-/// come nearer by the fit.
+/// Largest distances of finer triangles from the target, over the requested error. They apply after a failed
+/// fit, and in place of triangles that have lost parts. The second is smaller, as the fit hardly improves
+/// parts that are narrow for their shells.
 const FINER: f64 = 1.5;
 const WHOLE: f64 = 1.2;
 
-/// From so many triangles down, collapses that make triangles cross are refused at first. Among more, looking
-/// takes longer than all else: that is for surfaces whose shells cross otherwise.
+/// Number of triangles from which on down collapses that make triangles cross are refused at first. Among
+/// more triangles the check takes longer than all else. It is then left to surfaces whose shells cross
+/// otherwise.
 pub(super) const UNCROSSED: usize = 20_000;
 
-/// What a fit starts from.
+/// Triangles that a fit starts from.
 pub(super) struct Starts {
     pub(super) first: TriangleMesh,
-    /// What it starts from again if it fails.
+    /// Triangles for a second fit if the first fails.
     pub(super) finer: Option<TriangleMesh>,
-    /// Whether even these have lost parts. A fit does not bring them back.
+    /// True if even the first triangles have lost parts. A fit does not bring them back.
     pub(super) is_lost: bool,
 }
 
 impl Starts {
-    /// Makes them of the surface of a target. From `uncrossed` triangles down they do not come to cross.
+    /// Makes the triangles from the surface of a target. From `uncrossed` triangles down, collapses do not
+    /// make them cross.
     pub(super) fn new(mesh: &TriangleMesh, goal: ShellGoal, target: &Target, uncrossed: usize) -> Self {
         let (numbers, aim) = match goal {
             ShellGoal::Error(error) => {
@@ -78,7 +80,7 @@ fn farthest(mesh: &TriangleMesh, target: &Target) -> f64 {
     far.reduce(|| 0.0, f64::max)
 }
 
-/// The edge of as many equilateral triangles of the same area [m].
+/// The edge of equilateral triangles of the same number and area [m].
 fn mean_edge(mesh: &TriangleMesh) -> f64 {
     let area: f64 = mesh.alive().map(|t| mesh.area(t)).sum();
     (4.0 * area / (3.0_f64.sqrt() * mesh.len().max(1) as f64)).sqrt()
@@ -113,8 +115,8 @@ mod tests {
         }
     }
 
-    /// A hundred triangles hold a ball, and not twenty rods: there, the fit starts from triangles that have
-    /// them all.
+    /// A hundred triangles hold a ball but not twenty rods. So the fit starts from triangles that have them
+    /// all.
     #[test]
     fn few_triangles_start_where_no_part_is_lost() {
         let starts = |field: &dyn ImplicitField, error: f64| {

@@ -1,6 +1,6 @@
-//! The surface to be fitted, and the points of it that are looked at. Where a surface folds, its other side
-//! may be nearer than the side that a shell stands for: what looks the other way is passed over, as far as
-//! the shell is large.
+//! The surface to be fitted, and its sampled points. Where a surface folds, its other side may be nearer than
+//! the side that a shell stands for. Points that look the other way are passed over within the size of the
+//! shell.
 
 use std::collections::BTreeMap;
 
@@ -11,24 +11,24 @@ use crate::report::hausdorff::{Sample, samples};
 use crate::surface::remesh::Reference;
 use crate::surface::triangles::TriangleMesh;
 
-/// Points of the target at most that are looked at in each round, and when all seems well.
+/// Most points of the target that are measured in each round, and for the final check.
 const MOST_COARSE: usize = 20_000;
 const MOST_FINE: usize = 80_000;
 
-/// What has a normal with a smaller cosine to a shell's looks the other way.
+/// Cosine between two normals below which a surface looks the other way from a shell.
 pub(super) const FACING: f64 = -0.3;
 
 /// The surface to be fitted.
 pub(super) struct Target {
     pub(super) reference: Reference,
-    /// Looked at in each round.
+    /// Measured in each round.
     pub(super) coarse: Detail,
-    /// Looked at when all seems well.
+    /// Measured for the final check.
     pub(super) fine: Detail,
     pub(super) diagonal: f64,
 }
 
-/// How closely distances are looked at.
+/// Resolution at which distances are measured.
 pub(super) struct Detail {
     /// Points of the target.
     pub(super) samples: Vec<Sample>,
@@ -44,7 +44,7 @@ impl Target {
         let reference = Reference::new(mesh);
         let area: f64 = mesh.alive().map(|t| mesh.area(t)).sum();
         let detail = |part: f64, most: usize, parts: usize| {
-            // Points so far apart that the whole area takes the most.
+            // Spacing at which the whole area takes the most points.
             let spacing = (diagonal * part).max((area / most as f64).sqrt());
             let samples = thinned(distinct(samples(mesh, spacing)), spacing, most);
             let normals = samples.par_iter().map(|sample| reference.closest(&sample.point).1).collect();
@@ -55,8 +55,8 @@ impl Target {
         Self { coarse, fine, diagonal, reference }
     }
 
-    /// The nearest point that looks the same way as `facing`, and the normal there. One that looks the other
-    /// way counts if there is none that is farther off by less than `reach` [m].
+    /// Returns the nearest point that looks the same way as `facing`, and the normal there. The nearest point
+    /// of all counts, even if it looks the other way, unless such a point is within `reach` [m] beyond it.
     pub(super) fn foot(&self, x: &Vector3, facing: &Vector3, reach: f64) -> (Vector3, Vector3) {
         let nearest = self.reference.closest(x);
         if nearest.1.dot(facing) < FACING {
@@ -67,7 +67,7 @@ impl Target {
     }
 }
 
-/// Samples at the same place made one.
+/// Merges samples at the same place.
 fn distinct(mut samples: Vec<Sample>) -> Vec<Sample> {
     let place = |sample: &Sample| <[f64; 3]>::from(sample.point).map(f64::to_bits);
     samples.sort_by_key(place);
@@ -79,8 +79,8 @@ fn distinct(mut samples: Vec<Sample>) -> Vec<Sample> {
     samples
 }
 
-/// So few samples that no cube of a grid holds two, of cubes that grow until there are no more than `most`.
-/// One stands for the area of all in its cube.
+/// Thins samples so that no cube of a grid holds two. The cubes grow until there are no more than `most`. One
+/// sample stands for the area of all in its cube.
 fn thinned(mut samples: Vec<Sample>, spacing: f64, most: usize) -> Vec<Sample> {
     let mut size = 0.5 * spacing;
     while samples.len() > most {

@@ -1,4 +1,4 @@
-//! What ends a fit and what a second one mends, on made-up surfaces.
+//! Tests of the ends of fits and of second fits, on synthetic surfaces.
 
 use super::*;
 use crate::{DEFAULT_CELL_LIMIT, Ellipsoid, ImplicitField, sphere};
@@ -46,8 +46,8 @@ fn surface(field: &dyn ImplicitField, edge: f64) -> TriangleMesh {
     TriangleMesh::of_field(field, edge, DEFAULT_CELL_LIMIT).unwrap()
 }
 
-/// What is found with so much work, from collapses that are looked at from so many triangles down, and the
-/// rounds that were told.
+/// Returns the shells that a limited amount of work finds, and the rounds that were reported. Collapses are
+/// checked for crossings from `uncrossed` triangles down.
 fn found(mesh: &TriangleMesh, goal: ShellGoal, most: usize, uncrossed: usize) -> (FittedShells, usize) {
     let rounds = std::cell::Cell::new(0);
     let told = |progress: FitProgress| {
@@ -57,8 +57,8 @@ fn found(mesh: &TriangleMesh, goal: ShellGoal, most: usize, uncrossed: usize) ->
     (FittedShells::within(mesh, goal, Effort::new(most), uncrossed, &told), rounds.get())
 }
 
-/// A ball with a cavity, whose wall of 0.05 is thinner than few flat triangles are off it: decimated without
-/// a look at crossings they cross, so that all is done again with it.
+/// A ball with a cavity, whose wall of 0.05 is thinner than the error of few flat triangles. Decimated
+/// without a check for crossings, they cross, so the fit is repeated with that check.
 #[test]
 fn shells_whose_triangles_cross_are_fitted_again_from_some_that_never_did() {
     let mut ball = sphere(1.0, 3, DEFAULT_CELL_LIMIT).unwrap();
@@ -117,8 +117,8 @@ fn nodes_of_a_sharp_rim_have_no_normal() {
     assert_eq!(fitted.report.crossings, Flaw::default());
 }
 
-/// A thousandth of a percent is out of reach with so little work: the fit stops, and says how close it is,
-/// and where.
+/// A thousandth of a percent is out of reach with a small amount of work. The fit stops, and reports how
+/// close it is, and where.
 #[test]
 fn a_fit_that_cannot_reach_its_goal_ends_with_the_best_so_far() {
     let mesh = surface(&Ellipsoid::sphere(Vector3::zeros(), 0.02), 0.003);
@@ -140,7 +140,7 @@ fn a_fit_that_cannot_reach_its_goal_ends_with_the_best_so_far() {
     assert!(short < long && more.report.distances.largest() < few.report.distances.largest());
 }
 
-/// The work does not grow with the triangles of the target: four times as many take as many rounds of as many
+/// The work does not grow with the triangles of the target: four times as many need as many rounds and
 /// searches.
 #[test]
 fn the_work_of_a_fit_does_not_grow_with_the_triangles_of_the_target() {

@@ -1,21 +1,21 @@
-//! Normals that stand on their triangles. A shell takes the normal of a vertex as that of its surface, so it
-//! may lean by no more than 60° from the normal of any triangle round the vertex. Where the surface folds too
-//! sharply for any such normal, the vertex is a crease: like a shell without given normals, each fan of
-//! triangles that meet at less than 45° has a normal of its own there, and edges between fans leave the
-//! vertex straight.
+//! Normals that stand on their triangles. A shell takes the normal of a vertex as the normal of its surface.
+//! So this normal may lean by no more than 60° from the normal of any triangle round the vertex. Where the
+//! surface folds too sharply for any such normal, the vertex is a crease. As in a shell without given
+//! normals, each fan of triangles that meet at less than 45° then has its own normal. Edges between fans
+//! leave the vertex straight.
 
 use pliant_geometry::Vector3;
 
 use super::Shells;
 
-/// Least cosine between the normal of a vertex and those of its triangles: 60°, and what a file in single
-/// precision may add.
+/// Least cosine between the normal of a vertex and the normals of its triangles: 60°, less the rounding of a
+/// file in single precision.
 const UPRIGHT: f64 = 0.501;
 
 /// Least cosine between triangles of one fan: 45°, as shells without given normals have it.
 const SMOOTH: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// The unit vector nearest to `wish` among those that stand on all faces; `None` if there is none.
+/// The unit vector nearest to `wish` among all that stand on all faces; `None` without any.
 fn upright(faces: &[Vector3], wish: &Vector3) -> Option<Vector3> {
     let stands = |n: &Vector3| least_cosine(faces, n) >= UPRIGHT;
     if stands(wish) {
@@ -40,8 +40,8 @@ fn least_cosine(faces: &[Vector3], normal: &Vector3) -> f64 {
     faces.iter().map(|face| face.dot(normal)).fold(1.0, f64::min)
 }
 
-/// The unit vector whose largest angle to any face is least: the axis of the narrowest cone round all, which
-/// touches two of them or three.
+/// The unit vector whose largest angle to any face is least. It is the axis of the narrowest cone round all
+/// faces, which touches two or three faces.
 fn middle(faces: &[Vector3]) -> Vector3 {
     let mut best = (f64::NEG_INFINITY, faces.first().copied().unwrap_or_default());
     let mut consider = |axis: Vector3| {
@@ -65,21 +65,22 @@ fn middle(faces: &[Vector3]) -> Vector3 {
 }
 
 impl Shells {
-    /// From here on normals stand on their triangles.
+    /// Requires from this call on that normals stand on their triangles.
     pub(super) fn require_upright(&mut self) {
         self.strict = true;
         (0..self.mesh.points.len() as u32).for_each(|point| self.stand(point));
     }
 
-    /// Whether a change of the least cosine round a vertex is one that must not be: from upright to not, on
-    /// the way to the goal from along the surface to against it.
+    /// True if a change of the least cosine round a vertex must not happen. Once normals must stand, this is
+    /// a change from upright to not upright. On the way to the goal, it is a change from along the surface to
+    /// against it.
     pub(super) fn tilts(&self, before: f64, after: f64) -> bool {
         let least = if self.strict { UPRIGHT } else { 0.0 };
         before >= least && after < least
     }
 
-    /// Turns the normal of a vertex as far as it must to stand on all triangles round it; a crease where none
-    /// does.
+    /// Turns the normal of a vertex just far enough to stand on all triangles round it. If no normal does,
+    /// the vertex becomes a crease.
     pub(super) fn stand(&mut self, point: u32) {
         if !self.strict || self.sharp[point as usize] {
             return;
@@ -94,7 +95,7 @@ impl Shells {
         }
     }
 
-    /// The same of all vertices that may move.
+    /// Turns the normals of all vertices that may move, like [`Self::stand`].
     pub(super) fn stand_all(&mut self) {
         for point in 0..self.mesh.points.len() as u32 {
             if self.active[point as usize] {
@@ -155,8 +156,8 @@ impl Shells {
 mod tests {
     use super::*;
 
-    /// Two faces at an angle: the wish where it stands, else leaned to 60° from the farther one; none beyond
-    /// 120°.
+    /// Two faces at an angle: the wish where it stands, else the wish leaned to 60° from the farther face.
+    /// Beyond 120° no vector stands.
     #[test]
     fn a_normal_leans_no_more_than_it_must() {
         let tilted = |degrees: f64| Vector3::new(degrees.to_radians().sin(), 0.0, degrees.to_radians().cos());
@@ -166,7 +167,7 @@ mod tests {
         assert!((leaned.angle(&faces[0]).to_degrees() - 60.0).abs() < 0.1, "{leaned}");
         assert_eq!(upright(&[tilted(-61.0), tilted(61.0)], &tilted(0.0)), None);
         // Round a spike whose faces lean by 59° from its axis there is one, whatever the wish; by 61° there
-        // is none.
+        // is no such vector.
         let spike = |degrees: f64| {
             (0..7).map(|k| f64::from(k) * 0.9).map(move |turn| {
                 let (s, c) = degrees.to_radians().sin_cos();

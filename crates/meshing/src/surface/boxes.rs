@@ -1,6 +1,6 @@
-//! Boxes by their places, for surfaces that change: a box is in the cubes of a grid as coarse as it is large,
-//! so that a search looks at few cubes whatever the sizes are. Boxes that have changed are put in anew; those
-//! of before stay until all are put in again.
+//! Boxes by their places, for surfaces that change. Each box is in the cubes of a grid as coarse as the box
+//! is large. So a search looks at few cubes whatever the sizes are. Changed boxes are inserted anew; their
+//! old entries stay until all are inserted again.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -10,24 +10,24 @@ type Cubes = HashMap<[i64; 3], Vec<u32>>;
 
 /// Numbered boxes.
 pub(crate) struct Boxes {
-    /// By the power of two that is the edge of the cubes [m]. A box is in the cube of its centre.
+    /// Grids by the power of two that is the edge of their cubes [m]. A box is in the cube of its centre.
     grids: BTreeMap<i32, Cubes>,
     finest: i32,
     len: usize,
 }
 
 impl Boxes {
-    /// None so far. Boxes much smaller than `finest` [m] would share cubes.
+    /// Makes an empty set. Boxes much smaller than `finest` [m] would share cubes.
     pub(crate) fn new(finest: f64) -> Self {
         Self { grids: BTreeMap::new(), finest: power(finest), len: 0 }
     }
 
-    /// None, with the same finest cubes.
+    /// Makes an empty set with the same finest cubes.
     pub(crate) fn emptied(&self) -> Self {
         Self { grids: BTreeMap::new(), finest: self.finest, len: 0 }
     }
 
-    /// How many were put in.
+    /// Number of insertions.
     pub(crate) fn len(&self) -> usize {
         self.len
     }
@@ -40,7 +40,8 @@ impl Boxes {
         self.len += 1;
     }
 
-    /// All that may meet a box, and some that do not, in no order. What was put in twice may be there twice.
+    /// Returns all boxes that may meet a box, and some that do not, in no order. A box that was inserted
+    /// twice may occur twice.
     pub(crate) fn near(&self, [low, high]: [Vector3; 2]) -> Vec<u32> {
         let mut found = Vec::new();
         for (&power, cubes) in &self.grids {

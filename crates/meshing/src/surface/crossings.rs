@@ -27,8 +27,8 @@ pub(crate) fn crossings(points: &[Vector3], triangles: &[[u32; 3]]) -> (Vec<[u32
     crossing_groups(points, triangles, 1, |_| true)
 }
 
-/// The same of groups of so many triangles each, one after the other. A group may cross itself: it is a pair
-/// with itself then. Of each pair that counts at least one is looked at.
+/// Pairs of intersecting groups of `each` consecutive triangles. A group that crosses itself is a pair with
+/// itself. A pair counts if at least one of its groups is looked at.
 pub(crate) fn crossing_groups(
     points: &[Vector3],
     triangles: &[[u32; 3]],
@@ -77,26 +77,26 @@ pub(crate) fn crossing_groups(
     (pairs, place)
 }
 
-/// A box made to hold a point.
+/// Grows a box to hold a point.
 pub(crate) fn widened([low, high]: [Vector3; 2], x: &Vector3) -> [Vector3; 2] {
     [low.inf(x), high.sup(x)]
 }
 
 impl TriangleMesh {
-    /// The box of triangles; none of no triangles [m].
+    /// The box of triangles [m]; `None` without triangles.
     pub(crate) fn bounds(&self, triangles: &[[u32; 3]]) -> Option<[Vector3; 2]> {
         let start = self.points[*triangles.as_flattened().first()? as usize];
         let corners = triangles.as_flattened().iter().map(|&n| self.points[n as usize]);
         Some(corners.fold([start; 2], |own, x| widened(own, &x)))
     }
 
-    /// Whether new triangles would intersect each other or existing ones, except some that would be
-    /// removed.
+    /// True if new triangles would intersect each other or existing ones, except some that would be removed.
     pub(crate) fn would_cross(&self, new: &[[u32; 3]], gone: &[u32]) -> bool {
         self.would_cross_among(new, gone, self.alive())
     }
 
-    /// The same with some of the existing triangles.
+    /// True if new triangles would intersect each other or some of the existing ones, except those that would
+    /// be removed.
     pub(crate) fn would_cross_among(
         &self,
         new: &[[u32; 3]],
@@ -133,8 +133,8 @@ pub(crate) fn meet(at: &(impl Fn(u32) -> Vector3 + ?Sized), s: [u32; 3], t: [u32
     })
 }
 
-/// Whether a triangle lies on one side of the plane of another, or touches it. No edge of it pierces the
-/// other then.
+/// True if a triangle lies on one side of the plane of another, or touches it. Then no edge of the triangle
+/// pierces the other.
 fn is_beside(at: &(impl Fn(u32) -> Vector3 + ?Sized), plane: [u32; 3], triangle: [u32; 3]) -> bool {
     let [a, b, c] = plane.map(at);
     let normal = (b - a).cross(&(c - a));
@@ -142,7 +142,7 @@ fn is_beside(at: &(impl Fn(u32) -> Vector3 + ?Sized), plane: [u32; 3], triangle:
     heights.iter().all(|&h| h >= 0.0) || heights.iter().all(|&h| h <= 0.0)
 }
 
-/// Where a segment pierces a triangle, edges included: where a body meets its mirror image, edges cross
+/// Point where a segment pierces a triangle, edges included: where a body meets its mirror image, edges cross
 /// edges.
 fn pierced([p, q]: [Vector3; 2], [a, b, c]: [Vector3; 3]) -> Option<Vector3> {
     // Six times signed volumes; values below round-off count as touching.
@@ -162,7 +162,7 @@ fn pierced([p, q]: [Vector3; 2], [a, b, c]: [Vector3; 3]) -> Option<Vector3> {
 mod tests {
     use super::*;
 
-    /// Fans of triangles at places of a sequence that repeats itself no sooner than the test ends.
+    /// Fans of triangles at places of a sequence that does not repeat within the test.
     #[test]
     fn groups_cross_where_triangles_of_theirs_do() {
         let place =

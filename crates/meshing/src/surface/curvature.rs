@@ -1,6 +1,7 @@
-//! Curvature of a surface at its points: a linear change of the points' normals over each triangle, rotated
-//! into the points' tangent planes and averaged by area (Rusinkiewicz 2004). Positive where the surface is
-//! convex seen from outside: 1/R on a ball. Leaves out: points at borders, whose normals are one-sided.
+//! Curvature of a surface at its points (Rusinkiewicz 2004). The points' normals change linearly over each
+//! triangle. This change is rotated into the points' tangent planes and averaged by area. Positive where the
+//! surface is convex seen from outside: 1/R on a ball. Leaves out: points at borders, whose normals are
+//! one-sided.
 
 use nalgebra::{Matrix3, Rotation3};
 use pliant_geometry::Vector3;
@@ -81,15 +82,15 @@ impl TriangleMesh {
         sum.try_normalize(0.0).filter(|n| n.iter().all(|x| x.is_finite())).unwrap_or_default()
     }
 
-    /// The linear map in the plane of a triangle that takes its edges to the changes of normals along them,
-    /// in the least-squares sense, made symmetric [1/m].
+    /// The linear map in the plane of a triangle from its edges to the changes of normals along them. It is a
+    /// least-squares fit, made symmetric [1/m].
     fn change_of_normals(&self, triangle: u32, normals: &[Vector3]) -> Option<Matrix3<f64>> {
         let nodes = self.triangles[triangle as usize];
         let x = self.corners(triangle);
         let t = (x[1] - x[0]).try_normalize(0.0)?;
         let b = self.normal(triangle).cross(&t);
-        // Unknowns e, f, g of [e f; f g]: for each edge (u, v) two equations e u + f v = Δn·t, f u + g v =
-        // Δn·b.
+        // Unknowns e, f, g of [e f; f g]. Each edge (u, v) has two equations: e u + f v = Δn·t and f u + g
+        // v = Δn·b.
         let (mut matrix, mut right) = (Matrix3::zeros(), Vector3::zeros());
         for k in 0..3 {
             let (from, to) = ((k + 1) % 3, (k + 2) % 3);

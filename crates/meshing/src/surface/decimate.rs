@@ -1,7 +1,7 @@
 //! Fewer triangles for the same surface: edges collapse in the order of their cost. The cost is the sum of
-//! squared distances from the surrounding planes (Garland and Heckbert 1997), each weighted by its area, with
-//! planes through borders and creases to preserve these. A collapse must keep the topology, the orientation
-//! of faces and some of their shape.
+//! squared distances from the surrounding planes, each weighted by its area (Garland and Heckbert 1997).
+//! Planes through borders and creases preserve these. A collapse must keep the topology, the orientation of
+//! faces and some of their shape.
 
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
@@ -16,22 +16,22 @@ use crate::surface::triangles::{TriangleMesh, cross};
 /// Planes through borders and creases weigh this many times as much as faces of the same size.
 const LINE_WEIGHT: f64 = 10.0;
 
-/// Weight of a point's own place beside its planes: makes places on flat parts unique and triangles there
-/// even.
+/// Weight of a point's own place relative to its planes: makes places on flat parts unique and triangles
+/// there even.
 const PLACE_WEIGHT: f64 = 1e-3;
 
 /// Collapses leave no triangle of a worse shape, unless it was worse before.
 const LEAST_SHAPE: f64 = 0.1;
 
-/// Triangles are put in again where as many times their number were put in.
+/// The search boxes are rebuilt once the insertions exceed the number of triangles by this factor.
 const PUT_IN: usize = 4;
 
-/// When to stop.
+/// Condition to stop at.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fewer {
-    /// At this many triangles.
+    /// Stop at this many triangles.
     Triangles(usize),
-    /// Until the root mean square distance from the planes of a point exceeds this [m].
+    /// Stop when the root mean square distance from the planes of a point exceeds this [m].
     Distance(f64),
 }
 
@@ -73,14 +73,14 @@ impl Quadric {
     }
 }
 
-/// A collapse that was cheap when it was found.
+/// A collapse with its cost when it was found.
 struct Candidate {
     cost: f64,
-    /// The part of the planes.
+    /// The part of the planes in the cost.
     off: f64,
     edge: [u32; 2],
     position: Vector3,
-    /// Changes that its ends had seen.
+    /// Numbers of changes of its ends when it was found.
     changes: [u32; 2],
 }
 
@@ -106,11 +106,11 @@ impl Ord for Candidate {
 
 struct Decimation<'m> {
     mesh: &'m mut TriangleMesh,
-    /// Of planes, and of own places.
+    /// Quadrics of the planes, and of the points' own places.
     quadrics: Vec<[Quadric; 2]>,
     changes: Vec<u32>,
     queue: BinaryHeap<Reverse<Candidate>>,
-    /// Where the triangles are or were, if the surface is kept from crossing itself.
+    /// Present and past places of the triangles, if the surface is kept from crossing itself.
     placed: Option<Boxes>,
     /// Origin of the points, so that sums of squares keep their digits [m].
     origin: Vector3,
@@ -133,8 +133,8 @@ impl TriangleMesh {
         Ok(Decimation::new(self).run(least, limit))
     }
 
-    /// The surface in each of some numbers of triangles, decreasing, or in a few more where nothing more can
-    /// collapse. From `uncrossed` triangles down collapses do not make triangles cross each other.
+    /// The surface in each of some numbers of triangles, decreasing, or in a few more if nothing more can
+    /// collapse. From `uncrossed` triangles down, collapses do not make triangles cross each other.
     pub(crate) fn decimated_to_each(mut self, numbers: &[usize], uncrossed: usize) -> Vec<Self> {
         let mut work = Decimation::new(&mut self);
         work.run(uncrossed.max(numbers.first().copied().unwrap_or(0)), f64::INFINITY);
@@ -247,7 +247,7 @@ impl<'m> Decimation<'m> {
         count
     }
 
-    /// Where all triangles are.
+    /// Places of all triangles.
     fn places(&self) -> Boxes {
         let count = self.mesh.len().max(1) as f64;
         let area: f64 = self.mesh.alive().map(|t| self.mesh.area(t)).sum();
@@ -263,8 +263,7 @@ impl<'m> Decimation<'m> {
         [a.inf(&b).inf(&c), a.sup(&b).sup(&c)]
     }
 
-    /// Puts in the triangles round a point, which have changed, or all if too many that have changed since
-    /// are there.
+    /// Inserts the changed triangles round a point. If too many old entries remain, all are inserted anew.
     fn place_round(&mut self, point: u32, count: usize) {
         let Some(mut placed) = self.placed.take() else { return };
         if placed.len() > PUT_IN * count {
@@ -276,7 +275,7 @@ impl<'m> Decimation<'m> {
         self.placed = Some(placed);
     }
 
-    /// Whether triangles cross after a collapse where none did before, if that counts.
+    /// True if triangles cross after a collapse where none did before. Always false if crossings are allowed.
     fn makes_cross(&mut self, keep: u32, gone: u32, position: Vector3) -> bool {
         let Some(placed) = &self.placed else { return false };
         let mut old: Vec<u32> =
@@ -318,8 +317,8 @@ mod tests {
         assert!(apart.largest_forward < 0.015 && apart.largest_backward < 0.015, "{apart:?}");
     }
 
-    /// A ball with a cavity, whose wall is thinner than flat triangles of the last size are off it: the faces
-    /// of the wall do not cross.
+    /// A ball with a cavity, whose wall is thinner than the error of the last flat triangles. The faces of
+    /// the wall do not cross.
     #[test]
     fn the_faces_of_a_thin_wall_do_not_cross() {
         let mut ball = sphere(1.0, 4, DEFAULT_CELL_LIMIT).unwrap();

@@ -1,6 +1,6 @@
-//! The surface of a field in triangles: the cubes of a grid are cut into six tetrahedra each, all along the
-//! same diagonals (Freudenthal 1942), and in each the surface is one triangle or two. It is closed and
-//! manifold for any values, as it has no ambiguous cells.
+//! The surface of a field in triangles. The cubes of a grid are cut into six tetrahedra each, all along the
+//! same diagonals (Freudenthal 1942). In each the surface is one triangle or two. It is closed and manifold
+//! for any values, as it has no ambiguous cells.
 
 use std::collections::BTreeMap;
 
@@ -67,7 +67,7 @@ pub(crate) fn euler_number_of_field(
 /// An edge of the tetrahedra: two points of the grid, the first inside.
 type CutEdge = [u32; 2];
 
-/// Where the zero surface of a field cuts a grid.
+/// Section of a grid with the zero surface of a field.
 struct Cut {
     grid: SampleGrid,
     values: Vec<f64>,
@@ -144,7 +144,7 @@ impl SampleGrid {
         found
     }
 
-    /// Where the field is zero between a point inside and one outside.
+    /// Zero of the field between a point inside and one outside.
     fn crossing(&self, field: &(impl ImplicitField + ?Sized), [a, b]: CutEdge, values: &[f64]) -> Vector3 {
         let (mut p, mut q) = (self.point(a as usize), self.point(b as usize));
         let (mut u, mut v) = (values[a as usize], values[b as usize]);

@@ -57,8 +57,8 @@ impl Reference {
         self.locator.closest(to).map_or((*to, Vector3::zeros()), |at| (at.position, at.normal))
     }
 
-    /// The same among normals with a cosine above `least` with `facing`; `None` if none is less than `within`
-    /// [m] away.
+    /// Returns the nearest point, and its normal, among normals with a cosine above `least` with `facing`;
+    /// `None` if no such point is less than `within` [m] away.
     pub(crate) fn closest_facing(
         &self,
         to: &Vector3,
@@ -149,7 +149,7 @@ impl TriangleMesh {
         }
     }
 
-    /// Whether two new triangles have the orientation of the old ones, and the worse shape is better than
+    /// True if two new triangles have the orientation of the old ones, and the worse shape is better than
     /// `factor` times the old.
     pub(crate) fn flip_is_sound(&self, old: [u32; 2], new: [[u32; 3]; 2], factor: f64) -> bool {
         let mean = self.normal(old[0]) + self.normal(old[1]);
@@ -188,7 +188,7 @@ impl TriangleMesh {
         Some(if free { reference.closest(&aim).0 } else { reference.closest_on_lines(&aim) })
     }
 
-    /// A place of a point beside the surface among evener triangles.
+    /// A place of a point near the surface among evener triangles.
     pub(crate) fn even_place(&self, point: u32) -> Option<Vector3> {
         if self.star[point as usize].is_empty() {
             return None;
@@ -223,9 +223,9 @@ mod tests {
     use crate::report::hausdorff::Hausdorff;
     use crate::shapes::phantom::{Organ, Phantom};
 
-    /// The liver phantom at 8 mm: mean shape above 0.9, no triangle below 0.4, edges near 8 mm, as far from
-    /// the fine surface as chords of 8 mm on its radii of 10 mm and more (h²/8r = 0.8 mm). At the thin edge
-    /// of the lobe, which has no marked line, triangles stay behind by up to an edge.
+    /// The liver phantom at 8 mm: mean shape above 0.9, no triangle below 0.4, edges near 8 mm. The distance
+    /// from the fine surface is the sagitta of chords of 8 mm on radii of 10 mm and more (h²/8r = 0.8 mm). At
+    /// the thin edge of the lobe, which has no marked line, triangles stay behind by up to an edge.
     #[test]
     fn a_liver_gets_even_triangles_and_keeps_its_shape() {
         let fine =

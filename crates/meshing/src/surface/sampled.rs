@@ -14,19 +14,19 @@ use crate::surface::triangles::TriangleMesh;
 use crate::surface::winding::Winding;
 use crate::{DEFAULT_CELL_LIMIT, Fewer};
 
-/// Every so many points along each axis have an exact distance also far from the surface.
+/// Spacing, in points along each axis, of the points that have an exact distance also far from the surface.
 const COARSE: usize = 4;
 
-/// Points of the grid on each side of the moved surface with exact distances, at least.
+/// Least number of grid points on each side of the moved surface with exact distances.
 const BAND: f64 = 2.0;
 
-/// Points around the surface at least.
+/// Least number of grid points around the surface.
 const MARGIN: f64 = 4.0;
 
 /// Steps of the grid along the cubes in which a moved surface is drawn.
 const DRAWN: f64 = 3.0;
 
-/// Triangles of a drawn surface at most.
+/// Most triangles of a drawn surface.
 const MOST_DRAWN: usize = 20_000;
 
 /// Signed distances of a surface on a regular grid.
@@ -42,7 +42,7 @@ pub struct SampledDistances {
     pub values: Vec<f32>,
     /// The moved surface in triangles, to be drawn.
     pub surface: TriangleMesh,
-    /// Thickness of what it encloses [m]: less in a twentieth of the surface only.
+    /// Thickness of the inside [m]: the true thickness is less on a twentieth of the surface only.
     pub thickness: f64,
 }
 
@@ -180,8 +180,8 @@ mod tests {
         beyond.map(|x| x.max(0.0)).norm() + beyond.max().min(0.0)
     }
 
-    /// Of a box: exact where they are small, with the right sign everywhere, elsewhere off by less than the
-    /// coarse points are apart.
+    /// Distances to a box: exact where they are small, with the right sign everywhere. Elsewhere they are off
+    /// by less than the spacing of the coarse points.
     #[test]
     fn distances_to_a_box_are_those_of_geometry() {
         let size = [0.05, 0.03, 0.02];

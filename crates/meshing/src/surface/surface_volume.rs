@@ -1,7 +1,7 @@
 //! Surfaces of segmented bodies that keep their volume. Facets between points of a curved surface cut it off,
 //! and smoothing takes thin parts away: a ball of few triangles has lost a fifth. All points move along their
-//! normals until the surface encloses the volume of the input, less the parts that it lacks altogether. What
-//! is left is reported.
+//! normals until the surface encloses the volume of the input, less the parts that it lacks altogether. The
+//! remaining error is reported.
 
 use pliant_geometry::Vector3;
 use serde::Serialize;
@@ -14,11 +14,11 @@ use crate::surface::triangles::TriangleMesh;
 use crate::tets::lost::{LostPart, Samples};
 use crate::tets::organ::LostReport;
 
-/// Corrections at most, and how near they come to the volume.
+/// Most corrections, and their relative tolerance of the volume.
 const STEPS: usize = 6;
 const ENOUGH: f64 = 1e-4;
 
-/// How far points may move in all, in mean edges.
+/// Largest total move of the points, in mean edges.
 const MOST: f64 = 0.25;
 
 /// One label of a surface.
@@ -40,7 +40,7 @@ pub struct SurfaceVolume {
     pub labels: Vec<LabelVolume>,
     /// Parts of the labels that the surface lacks, the largest first.
     pub lost: Vec<LostReport>,
-    /// How far points moved outwards to keep the volume [m].
+    /// Distance that points moved outwards to keep the volume [m].
     pub moved: f64,
 }
 
@@ -104,7 +104,7 @@ impl TriangleMesh {
     pub fn keep_volume(&mut self, anatomy: &Anatomy<'_>) -> Option<SurfaceVolume> {
         let faces = self.len();
         let area: f64 = self.alive().map(|t| self.area(t)).sum();
-        // Of an equilateral triangle of the mean area.
+        // The edge of an equilateral triangle of the mean area.
         let edge = (4.0 / 3.0_f64.sqrt() * area / faces as f64).sqrt();
         let samples = Samples::of(anatomy, edge)?;
         let far = (edge / 2.0).max(anatomy.resolution());
@@ -134,13 +134,13 @@ impl TriangleMesh {
         })
     }
 
-    /// Volume within it [m³]; of an open surface without meaning.
+    /// Volume within it [m³]; meaningless for an open surface.
     pub(crate) fn volume(&self) -> f64 {
         let (points, triangles) = self.compact();
         signed_volume(&points, &triangles)
     }
 
-    /// A sentence on how its volume differs from that of the surface it was made of, if by more than 5 %;
+    /// Describes how much its volume differs from the volume of the input surface, if by more than 5 %;
     /// `None` for open surfaces.
     pub fn volume_warning(&self, input: &Self) -> Option<String> {
         let error = self.volume() / input.volume() - 1.0;

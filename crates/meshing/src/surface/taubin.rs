@@ -1,5 +1,5 @@
-//! Smoothing of a surface without shrinking it (Taubin 1995): each point moves towards the mean of its
-//! neighbours by the fraction λ, then away from it by a slightly larger fraction μ. Together they damp
+//! Smoothing of a surface without shrinking it (Taubin 1995). Each point moves towards the mean of its
+//! neighbours by the fraction λ, then away from this mean by a slightly larger fraction μ. Together they damp
 //! changes from point to point and preserve longer ones.
 
 use pliant_geometry::Vector3;

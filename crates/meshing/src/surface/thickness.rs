@@ -12,10 +12,10 @@ use crate::report::hausdorff::Sample;
 use crate::report::percentiles::Percentiles;
 use crate::surface::triangles::TriangleMesh;
 
-/// Places along the diagonal of the box that every face has at least.
+/// Faces are divided to edges of the diagonal of the box over this.
 const ALONG: f64 = 100.0;
 
-/// Parts along an edge of a face at most.
+/// Most parts along an edge of a face.
 const MOST_PARTS: f64 = 16.0;
 
 /// Thickness over the area of a closed surface.
@@ -28,7 +28,7 @@ pub struct Thickness {
 }
 
 impl TriangleMesh {
-    /// Whether each edge has two triangles.
+    /// True if each edge has two triangles.
     pub fn is_closed(&self) -> bool {
         self.edges().iter().all(|&[a, b]| !self.is_border(a, b))
     }
@@ -123,7 +123,7 @@ impl Ray {
 }
 
 impl SelectionFunction<Face> for Ray {
-    /// Whether the ray meets a box (Kay and Kajiya 1986).
+    /// True if the ray meets a box (Kay and Kajiya 1986).
     fn should_unpack_parent(&self, envelope: &AABB<[f64; 3]>) -> bool {
         let (low, high) = (envelope.lower(), envelope.upper());
         let (mut from, mut to) = (0.0_f64, f64::INFINITY);
@@ -162,7 +162,7 @@ mod tests {
         for value in [found.thickness.least, found.thickness.p5, found.thickness.median] {
             assert!((value - 0.004).abs() < 1e-12, "{found:?}");
         }
-        // The narrow sides see each other.
+        // The rays hit the opposite narrow sides.
         assert!((found.thickness.most - 0.2).abs() < 1e-12, "{found:?}");
     }
 

@@ -1,8 +1,8 @@
 //! A surface of triangles that changes: edges collapse, are halved or flipped. Borders and creases are marked
-//! edges; a point where other than two of them meet is a corner and stays. Surfaces from files are made
-//! manifold first: points at one place are one, faces without area or given twice go, where more than two
-//! faces share an edge the surface is cut, faces are turned alike and outwards. Leaves out: finding and
-//! mending surfaces that pass through themselves.
+//! edges; a point where a number of marked edges other than two meet is a corner and stays. Surfaces from
+//! files are made manifold first. Points at one place become one, and faces without area or given twice go.
+//! The surface is cut where more than two faces share an edge. Faces are turned alike and outwards. Leaves
+//! out: finding and mending surfaces that pass through themselves.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fmt;
@@ -36,7 +36,7 @@ pub struct TriangleMesh {
     pub(crate) star: Vec<Vec<u32>>,
     /// Edges that stay edges, smaller point first.
     creases: BTreeSet<[u32; 2]>,
-    /// Whether it has borders. Collapses, splits and flips open and close nothing.
+    /// True if it has borders. Collapses, splits and flips open and close nothing.
     open: bool,
 }
 
@@ -145,8 +145,8 @@ impl TriangleMesh {
         mesh
     }
 
-    /// The same for a file or a body: points at one place, where the surface touches itself, are moved a
-    /// little apart, each towards its neighbours. Readers take points at one place for one.
+    /// Returns the mesh for a file or a body, where readers take points at one place for one. Points at one
+    /// place, where the surface touches itself, are moved a little apart, each towards its neighbours.
     pub fn to_parted_mesh(&self) -> Mesh {
         let mut mesh = self.to_mesh();
         let rest = mesh.points.clone();
@@ -176,7 +176,7 @@ impl TriangleMesh {
         mesh
     }
 
-    /// Points in use and triangles of them.
+    /// Returns the points in use and the triangles with these points' numbers.
     pub(crate) fn compact(&self) -> (Vec<Vector3>, Vec<[u32; 3]>) {
         let mut number = vec![u32::MAX; self.points.len()];
         let mut points = Vec::new();
@@ -225,9 +225,9 @@ impl TriangleMesh {
         compacted
     }
 
-    /// Puts triangles in the place of others, and new ones beside them: those of a part of this surface that
-    /// has changed, whose triangles and points have these numbers here. Creases between its points are those
-    /// of the part.
+    /// Puts in the triangles of a changed part of this surface: they replace others and add new ones. `own`
+    /// and `nodes` are the numbers of its triangles and points here. Creases between its points are taken
+    /// from the part.
     pub(crate) fn put(&mut self, part: &Self, own: &[u32], nodes: &[u32]) {
         for &t in own.iter().filter(|&&t| (t as usize) < self.triangles.len()) {
             let [a, b, c] = self.triangles[t as usize];
@@ -331,7 +331,7 @@ impl TriangleMesh {
         self.open && matches!(self.sides(a, b), [Some(_), None])
     }
 
-    /// Whether an edge is a border or a crease.
+    /// True if an edge is a border or a crease.
     pub(crate) fn is_marked(&self, a: u32, b: u32) -> bool {
         self.is_border(a, b) || self.creases.contains(&key(a, b))
     }
@@ -346,8 +346,8 @@ impl TriangleMesh {
         found
     }
 
-    /// Whether the edge can collapse into its first end so that the surface keeps its topology and its marked
-    /// lines: the link condition (Dey et al. 1999), with the outside of a border as one more point.
+    /// True if the edge can collapse into its first end so that the surface keeps its topology and its marked
+    /// lines. This is the link condition (Dey et al. 1999), with the outside of a border as one more point.
     pub(crate) fn may_collapse(&self, keep: u32, gone: u32) -> bool {
         let lines = self.marked(gone);
         if !(lines.is_empty() || lines.len() == 2 && lines.contains(&keep)) {
@@ -375,7 +375,7 @@ impl TriangleMesh {
         }
     }
 
-    /// Whether all triangles round two points that stay keep their side and some shape if the points become
+    /// True if all triangles round two points that stay keep their side and some shape if the points become
     /// one at `position`.
     pub(crate) fn keeps_sides(&self, keep: u32, gone: u32, position: &Vector3, least_shape: f64) -> bool {
         [(keep, gone), (gone, keep)].into_iter().all(|(own, other)| {
@@ -579,8 +579,9 @@ fn turn_pieces(triangles: &mut [[u32; 3]]) -> (Vec<Vec<u32>>, Vec<bool>) {
     (pieces, closed)
 }
 
-/// Triangles of an edge that continue each other on one surface. Of more than two, those that bound the same
-/// inside: from each, turning about the edge into its inside, the next one that runs the other way.
+/// Pairs of triangles of an edge that continue each other on one surface. If there are more than two, pairs
+/// bound the same inside. From each triangle the search turns about the edge into its inside, to the next
+/// triangle that runs the other way.
 fn joined_at(
     edge: [u32; 2],
     sides: &[(u32, bool)],

@@ -1,7 +1,7 @@
-//! How often a surface winds round a point: 1 inside, 0 outside, in between near holes, more where parts
+//! Winding number of a surface round a point: 1 inside, 0 outside, in between near holes, more where parts
 //! overlap (Jacobson, Kavan and Sorkine-Hornung 2013). Triangles far away count together, as a dipole at
-//! their middle (Barill et al. 2018, first order); the solid angle of a near one is exact (van Oosterom and
-//! Strackee 1983).
+//! their middle (Barill et al. 2018, first order). The solid angle of a near triangle is exact (van Oosterom
+//! and Strackee 1983).
 
 use pliant_geometry::Vector3;
 

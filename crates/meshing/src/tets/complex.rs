@@ -35,7 +35,7 @@ pub const MOST_MATERIALS: usize = 127;
 /// No step makes an edge longer than this many lattice constants.
 pub(crate) const LONGEST: f64 = 1.6;
 
-/// Tets, points and how they hang together.
+/// Tets, points and their connections.
 #[derive(Clone)]
 pub(crate) struct Complex {
     pub(crate) points: Vec<Vector3>,
@@ -45,7 +45,7 @@ pub(crate) struct Complex {
     /// The tets round each point.
     pub(crate) star: Vec<Vec<u32>>,
     pub(crate) sides: Vec<Sides>,
-    /// Lattice constant round each point [m]: how long the edges there should be.
+    /// Lattice constant round each point [m]: the intended length of edges there.
     pub(crate) size: Vec<f64>,
 }
 
@@ -60,13 +60,13 @@ pub(crate) fn acoustic_length(x: [Vector3; 4]) -> f64 {
 }
 
 impl Complex {
-    /// All tets of material 1, of a lattice of one constant [m].
+    /// Builds a complex of tets of material 1, of a lattice of one constant [m].
     pub(crate) fn new(points: Vec<Vector3>, tets: Vec<[u32; 4]>, edge: f64) -> Self {
         let size = vec![edge; points.len()];
         Self::graded(points, tets, size)
     }
 
-    /// All tets of material 1, of a lattice with its constant round each point [m].
+    /// Builds a complex of tets of material 1, of a lattice with its constant round each point [m].
     pub(crate) fn graded(points: Vec<Vector3>, tets: Vec<[u32; 4]>, size: Vec<f64>) -> Self {
         let mut star = vec![Vec::new(); points.len()];
         for (tet, nodes) in (0..).zip(&tets) {
@@ -120,23 +120,23 @@ impl Complex {
         a.min(b).min(c.min(d)) / 8_f64.sqrt()
     }
 
-    /// Acoustic length of a tet over that of the ideal one.
+    /// Acoustic length of a tet over the acoustic length of the ideal one.
     pub(crate) fn part(&self, tet: u32) -> f64 {
         self.length(tet) / self.ideal(self.tets[tet as usize])
     }
 
-    /// How long an edge may get [m].
+    /// Longest allowed length of an edge [m].
     pub(crate) fn longest(&self, p: u32, q: u32) -> f64 {
         LONGEST * self.size[p as usize].max(self.size[q as usize])
     }
 
-    /// Whether an edge between two points would be too long.
+    /// True if an edge between two points would be too long.
     pub(crate) fn is_too_long(&self, p: u32, q: u32) -> bool {
         (self.points[p as usize] - self.points[q as usize]).norm() > self.longest(p, q)
     }
 
-    /// Whether moving a point to `place` makes one of its edges too long (except that to `without`), or
-    /// lengthens one that already is.
+    /// True if moving a point to `place` makes one of its edges too long, or lengthens one that already is.
+    /// The edge to `without` does not count.
     pub(crate) fn stretches(&self, point: u32, place: &Vector3, without: u32) -> bool {
         let from = &self.points[point as usize];
         let stretched = |&node: &u32| {
@@ -147,7 +147,7 @@ impl Complex {
         self.star[point as usize].iter().flat_map(|&tet| &self.tets[tet as usize]).any(stretched)
     }
 
-    /// Whether an edge becomes too long when `gone` is joined into `kept` at `place`.
+    /// True if an edge becomes too long when `gone` is joined into `kept` at `place`.
     pub(crate) fn overstretches(&self, gone: u32, kept: u32, place: &Vector3) -> bool {
         let too_long = |&node: &u32| {
             let length = (place - self.points[node as usize]).norm();
@@ -188,10 +188,10 @@ impl Complex {
         self.alive().map(|tet| self.part(tet)).fold(f64::INFINITY, f64::min)
     }
 
-    /// Acoustic length of a single point if it were at `place` [m]: 1 / √(K / m) with its stiffness K = Σ
-    /// V |∇N|² and its mass m = Σ V / 4 over its tets, of material with a wave speed of 1. A step above twice
-    /// that is unstable, since K c² / m is a Rayleigh quotient of M⁻¹ K. In the ideal lattice it equals the
-    /// acoustic length; points with few tets can have half of their tets' length.
+    /// Acoustic length of a single point if it were at `place` [m]: 1 / √(K / m) for a wave speed of 1. K = Σ
+    /// V |∇N|² is its stiffness and m = Σ V / 4 its mass, summed over its tets. A step above twice that is
+    /// unstable, since K c² / m is a Rayleigh quotient of M⁻¹ K. In the ideal lattice it equals the acoustic
+    /// length; points with few tets can have half of their tets' length.
     pub(crate) fn nodal_length(&self, point: u32, place: &Vector3) -> f64 {
         let (mut stiffness, mut mass) = (0.0, 0.0);
         for &tet in &self.star[point as usize] {
@@ -239,7 +239,7 @@ impl Complex {
         self.tets[tet as usize] = GONE;
     }
 
-    /// Halves an edge at `position`: every tet round it becomes two. The new point.
+    /// Halves an edge at `position`: every tet round it becomes two. Returns the new point.
     pub(crate) fn bisect(&mut self, [p, q]: [u32; 2], position: Vector3) -> u32 {
         let new = self.points.len() as u32;
         self.points.push(position);
@@ -268,8 +268,8 @@ impl Complex {
         new
     }
 
-    /// Puts a tet on each of some boundary faces, outward, with a new point at `position` as the apex; that
-    /// gets what `point` has.
+    /// Puts a tet on each of some boundary faces, outward. Their common apex is a new point at `position`
+    /// with the data of `point`.
     pub(crate) fn cap(&mut self, point: u32, faces: &[[u32; 3]], position: Vector3) {
         let apex = self.points.len() as u32;
         self.points.push(position);
@@ -308,8 +308,8 @@ impl Complex {
         self.points[kept as usize] = position;
     }
 
-    /// Whether joining the ends of an edge leaves the body and each of its materials as they hang together:
-    /// the link condition (Dey, Edelsbrunner, Guha, Nekhayev 1999) in the body and in every material, each
+    /// True if joining the ends of an edge keeps the topology of the body and of each of its materials. This
+    /// is the link condition (Dey, Edelsbrunner, Guha, Nekhayev 1999) in the body and in every material, each
     /// closed by a ghost point on its boundary.
     pub(crate) fn may_collapse(&self, u: u32, v: u32) -> bool {
         let stars = [u, v].map(|point| self.star[point as usize].as_slice());

@@ -25,11 +25,11 @@ const LEAST_AFTER_MOVE: f64 = 0.2;
 /// it.
 const GAP: f64 = 0.1;
 
-/// A tet that no cut gave to a material stays in the first one if that is not farther than this, in lattice
-/// constants.
+/// Largest distance from the first material, in lattice constants, at which it keeps a tet that no cut gave
+/// to a material.
 const FAR: f64 = 0.25;
 
-/// Where a surface crosses an edge.
+/// Crossing of a surface and an edge.
 struct EdgeCrossing {
     edge: [u32; 2],
     /// Fraction of the way from the first end.
@@ -79,7 +79,7 @@ pub(crate) fn cut_outside(complex: &mut Complex, field: &dyn ImplicitField) {
     complex.find_sides();
 }
 
-/// Cuts out gaps between banks of the body that edges of the mesh bridge. How many edges did.
+/// Cuts out gaps between banks of the body that edges of the mesh bridge. Returns the number of such edges.
 pub(crate) fn cut_gaps(complex: &mut Complex, field: &dyn ImplicitField) -> usize {
     let inside = |point: &Vector3| field.value(point);
     let mut values: Vec<f64> = complex.points.iter().map(inside).collect();
@@ -128,8 +128,8 @@ struct Surface<'a> {
 }
 
 impl Surface<'_> {
-    /// Cuts the mesh along the surface, given the function at its points; the side of each tet: positive
-    /// inside.
+    /// Cuts the mesh along the surface, given the function at its points. Returns the side of each tet:
+    /// positive inside.
     fn cut(&self, complex: &mut Complex, mut values: Vec<f64>) -> Vec<(u32, f64)> {
         self.move_points(complex, &mut values);
         let mut crossings = self.crossings(complex, &values);
@@ -182,7 +182,8 @@ impl Surface<'_> {
         EdgeCrossing { edge, at: 0.5 * (low + high), length: (end - start).norm() }
     }
 
-    /// Moves each free point that is near a crossing to its nearest one, where its tets bear it.
+    /// Moves each free point that is near a crossing to its nearest one, if the quality of its tets allows
+    /// that.
     fn move_points(&self, complex: &mut Complex, values: &mut [f64]) {
         let mut nearest: Vec<Option<(f64, Vector3)>> = vec![None; complex.points.len()];
         for crossing in self.crossings(complex, values) {

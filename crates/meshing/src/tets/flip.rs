@@ -11,7 +11,7 @@ const LONGEST_RING: usize = 8;
 /// A flip must lengthen the worst tet by this factor.
 const GAIN: f64 = 1.0 + 1e-3;
 
-/// Tells whether an edge of the boundary may turn, given its nodes and those of the new one.
+/// Returns true if an edge of the boundary may turn, given its nodes and the nodes of the new edge.
 pub(crate) type Follows<'a> = dyn Fn(&Complex, [u32; 2], [u32; 2]) -> bool + 'a;
 
 impl Complex {
@@ -122,7 +122,7 @@ impl Complex {
         if inversions.count() % 2 == 0 { [nodes[k], nodes[l]] } else { [nodes[l], nodes[k]] }
     }
 
-    /// The triangulation of a ring whose worst tet with p or q is best, and the length of that.
+    /// The best triangulation of a ring by its worst tet with p or q, and the acoustic length of this tet.
     fn best_triangulation(&self, ring: &[u32], p: u32, q: u32) -> Option<(f64, Vec<[usize; 3]>)> {
         let n = ring.len();
         let mut best = [[f64::INFINITY; LONGEST_RING + 1]; LONGEST_RING + 1];
@@ -168,7 +168,7 @@ impl Complex {
 /// The nodes round an edge.
 struct Ring {
     nodes: Vec<u32>,
-    /// Whether the edge lies on the boundary.
+    /// True if the edge lies on the boundary.
     open: bool,
 }
 

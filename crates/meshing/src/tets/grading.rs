@@ -1,6 +1,6 @@
 //! Tets of several sizes in the body of a field: the required sizes of the lattice cubes (`octree.rs`), and
-//! the lattice cut along the surface. Sizes are the requested edge times powers of two: this edge along the
-//! surface, longer ones inside and shorter ones in labels and places on request.
+//! the lattice cut along the surface. Sizes are the requested edge times powers of two. This edge is used
+//! along the surface, longer ones inside and shorter ones in labels and places on request.
 
 use std::collections::BTreeSet;
 
@@ -22,9 +22,9 @@ use crate::tets::topology::in_large_components;
 /// Cubes outside the body may be this many doublings larger than the edge.
 const LARGEST_OUTSIDE: usize = 3;
 
-/// Cubes across a thin part that is torn by larger ones. With 1.71 a lattice point is always left inside:
-/// points that are nearer to a side than 0.357 of a cube may move onto it, and no edge of a tet is longer
-/// than a cube.
+/// Number of smaller cubes across a thin part that larger ones would tear. With 1.71 a lattice point is
+/// always left inside. Points nearer to a side than 0.357 of a cube may move onto it, and no edge of a tet is
+/// longer than a cube.
 const CELLS_ACROSS: f64 = 1.75;
 
 /// Limit of cubes examined for a size.
@@ -32,16 +32,16 @@ const MOST_CUBES: f64 = (1 << 27) as f64;
 
 /// The levels of a lattice of several sizes. Level 0 has the smallest cubes.
 pub(crate) struct Levels {
-    /// Fraction of the requested edge.
+    /// Level of cubes with the requested edge.
     pub(crate) base: usize,
-    /// Of the largest cubes inside.
+    /// Level of the largest cubes inside.
     inner: usize,
-    /// Of each protected label.
+    /// Level of each protected label.
     protected: Vec<(i32, usize)>,
 }
 
 impl Levels {
-    /// Of a request; `finest` is the smallest edge that may be needed anywhere [m].
+    /// Levels of a request; `finest` is the smallest edge that may be needed anywhere [m].
     pub(crate) fn new(request: &OrganTets, finest: f64) -> Result<Self, MeshingError> {
         let edge = request.edge;
         require_positive("edge", edge)?;
@@ -59,8 +59,8 @@ impl Levels {
         Ok(Self { base, inner: base + doublings as usize, protected: protected.collect() })
     }
 
-    /// Wants smaller cubes round tears, at least halved ones and enough of them across the thin part; whether
-    /// any are.
+    /// Requests smaller cubes round tears: at least halved, and enough across the thin part. Returns whether
+    /// any were requested.
     pub(crate) fn close(
         &self,
         request: &OrganTets,
@@ -89,7 +89,7 @@ impl Levels {
     }
 }
 
-/// Cubes that must not be larger than their level, as found by measuring a mesh made before.
+/// Cubes that must not be larger than their level, found by measuring an earlier mesh.
 pub(crate) type Wanted = BTreeSet<(usize, Cube)>;
 
 /// A lattice over an anatomy, with cubes of the requested sizes.
@@ -136,7 +136,7 @@ pub(crate) fn tree(
     Ok(tree)
 }
 
-/// Where a cube lies.
+/// Position of a cube relative to the body.
 enum Where {
     Surface,
     Inside,
@@ -197,12 +197,12 @@ fn protect(tree: &mut Octree, anatomy: &Anatomy<'_>, label: i32, level: usize) -
     Ok(())
 }
 
-/// The tets of a lattice inside the body, and how many cells and pieces of it were left out as too small.
+/// The tets of a lattice inside the body, and the numbers of cells and pieces left out as too small.
 pub(crate) struct Filled {
     pub(crate) complex: Complex,
     pub(crate) dropped_pieces: usize,
     pub(crate) dropped_cells: usize,
-    /// Tears of thin parts, and how many smaller cells closed.
+    /// Remaining tears of thin parts, and the number of tears that smaller cells closed.
     pub(crate) tears: Vec<Tear>,
     pub(crate) closed_tears: usize,
 }

@@ -1,6 +1,6 @@
-//! Keeps the boundary of a mesh that changes free of intersections: a change is accepted if its faces neither
-//! cross other faces nor come nearer to them than a clearance. It starts from a boundary without
-//! intersections. Crossings are those of `crossings.rs`.
+//! Keeps the boundary of a mesh that changes free of intersections. A change is accepted if its faces neither
+//! cross other faces nor come nearer to them than a clearance. The first boundary must have no intersections.
+//! `crossings.rs` defines crossings.
 
 use std::collections::HashMap;
 
@@ -15,12 +15,12 @@ const CLEARANCE: f64 = 0.04;
 
 /// Faces of the boundary by place.
 pub(crate) struct Guard {
-    /// Faces, outward; those that are gone stay in the list.
+    /// Faces, outward; removed ones stay in the list.
     faces: Vec<[u32; 3]>,
     is_gone: Vec<bool>,
     /// Numbers of faces by their sorted nodes.
     numbers: HashMap<[u32; 3], u32>,
-    /// Numbers of the faces round each point; some are gone.
+    /// Numbers of the faces round each point; some are removed.
     round: Vec<Vec<u32>>,
     boxes: Boxes,
 }
@@ -31,7 +31,7 @@ fn key(mut face: [u32; 3]) -> [u32; 3] {
 }
 
 impl Guard {
-    /// Of the boundary of a mesh.
+    /// Guards the boundary of a mesh.
     pub(crate) fn new(complex: &Complex) -> Self {
         let finest = complex.size.iter().copied().fold(f64::INFINITY, f64::min);
         let mut guard = Self {
@@ -56,7 +56,7 @@ impl Guard {
         self.boxes.insert(number, box_of(face.map(|node| complex.points[node as usize])));
     }
 
-    /// Takes note of how points moved and of new faces round them.
+    /// Records the new positions of points and the new faces round them.
     pub(crate) fn note(&mut self, complex: &Complex, points: &[u32]) {
         self.round.resize(complex.points.len(), Vec::new());
         for &point in points {
@@ -90,7 +90,7 @@ impl Guard {
         }
     }
 
-    /// Whether a point may move to `place`.
+    /// True if a point may move to `place`.
     pub(crate) fn lets_move(&self, complex: &Complex, point: u32, place: &Vector3) -> bool {
         let of = &self.round[point as usize];
         let rim: Vec<[u32; 3]> = of
@@ -102,7 +102,7 @@ impl Guard {
         rim.is_empty() || self.lets(complex, &rim, &at, &|face| face.contains(&point))
     }
 
-    /// Whether `gone` may be joined into `kept` at `place`.
+    /// True if `gone` may be joined into `kept` at `place`.
     pub(crate) fn lets_collapse(&self, complex: &Complex, gone: u32, kept: u32, place: &Vector3) -> bool {
         let is_changed = |face: &[u32; 3]| face.contains(&gone) || face.contains(&kept);
         let of = self.round[gone as usize].iter().chain(&self.round[kept as usize]);
@@ -118,14 +118,14 @@ impl Guard {
         rim.is_empty() || self.lets(complex, &rim, &at, &is_changed)
     }
 
-    /// Whether the edge p q of two faces may turn to the other two nodes of these.
+    /// True if the edge p q of two faces may turn to the other two nodes a, b of the faces.
     pub(crate) fn lets_turn(&self, complex: &Complex, [p, q]: [u32; 2], [a, b]: [u32; 2]) -> bool {
         let at = |node: u32| complex.points[node as usize];
         self.lets(complex, &[[a, b, p], [b, a, q]], &at, &|face| face.contains(&p) && face.contains(&q))
     }
 
-    /// Whether faces keep clear of all others and of each other; `at` gives their corners, `is_replaced` the
-    /// faces that they replace.
+    /// True if new faces keep clear of all others and of each other. `at` gives their corners, `is_replaced`
+    /// the faces that they replace.
     fn lets(
         &self,
         complex: &Complex,
@@ -172,7 +172,7 @@ fn box_of(corners: [Vector3; 3]) -> [Vector3; 2] {
     corners.iter().fold([corners[0]; 2], widened)
 }
 
-/// Distance of two triangles that do not cross [m]: that of a corner from a triangle or of two edges.
+/// Distance of two triangles that do not cross [m]: from a corner to a triangle, or between two edges.
 fn distance(own: &[Vector3; 3], other: &[Vector3; 3]) -> f64 {
     let from = |corner: &Vector3, face: &[Vector3; 3]| {
         let weights = barycentric_of_closest(face, corner);
@@ -201,7 +201,7 @@ mod tests {
     use super::*;
     use pliant_testing::Random;
 
-    /// Compared with the nearest of many points of each.
+    /// Comparison with the nearest of many points of each.
     #[test]
     fn distances_of_triangles_are_those_of_their_nearest_points() {
         let mut random = Random::new(3);

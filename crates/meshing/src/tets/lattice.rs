@@ -81,7 +81,7 @@ impl Lattice {
         self.origin + Vector3::from(triple.map(f64::from)) * self.half
     }
 
-    /// Where a direction leads from a triple, if the lattice has it.
+    /// Target of a direction from a triple, if the lattice has it.
     pub(crate) fn neighbour(&self, triple: Triple, direction: Triple) -> Option<Triple> {
         let to = [0, 1, 2].map(|axis| triple[axis] + direction[axis]);
         self.contains(to).then_some(to)
@@ -108,8 +108,9 @@ impl Lattice {
     }
 }
 
-/// The tetrahedra around the long edges that start at a centre and lead along +x, +y and +z: each of four
-/// round an edge has the edge and two neighbouring corners of the face of the cube between.
+/// The tetrahedra around the long edges that start at a centre and lead along +x, +y and +z. There are four
+/// round each edge. Each has this edge and two neighbouring corners of the cube face that the edge passes
+/// through.
 pub(crate) fn tets_from(centre: Triple) -> impl Iterator<Item = [Triple; 4]> {
     const RING: [[i32; 2]; 4] = [[1, 1], [-1, 1], [-1, -1], [1, -1]];
     (0..12).map(move |at| {

@@ -1,23 +1,23 @@
-//! Edges that are longer than [`LONGEST`] times the local lattice constant are halved before the optimiser
-//! starts, which makes none itself. Where cubes of two sizes meet, two corners of a large cube may each have
-//! small cubes elsewhere: the edge between is twice as long as either asks for, and cuts along surfaces
-//! shorten what is asked for at its points, too.
+//! Edges longer than [`LONGEST`] times the local lattice constant are halved before the optimiser starts,
+//! which makes none itself. Where cubes of two sizes meet, two corners of a large cube may each have small
+//! cubes elsewhere. The edge between is then twice as long as either allows. Cuts along surfaces also shorten
+//! the allowed length at their points.
 
 use crate::input::surfaces::Surfaces;
 use crate::tets::complex::{Complex, LONGEST};
 use crate::tets::guard::Guard;
 
-/// Halvings of one edge at most; a halving makes shorter edges, so that few are needed.
+/// Most halvings of one edge; a halving makes shorter edges, so few are needed.
 const PASSES: usize = 8;
 
 /// Moving a new point onto its surface must leave its tets this part of the ideal acoustic length.
 const LEAST_AFTER_MOVE: f64 = 0.2;
 
-/// How far new points may be from their surface, in lattice constants.
+/// Largest distance of new points from their surface, in lattice constants.
 const REACH: f64 = 0.5;
 
-/// Halves edges that are too long, the longest as compared with its limit first. Points between sides go
-/// there. How many were halved.
+/// Halves edges that are too long, the longest relative to its limit first. New points between sides move
+/// onto them. Returns the number of halved edges.
 pub(crate) fn halve_long_edges(
     complex: &mut Complex,
     surfaces: &Surfaces<'_>,

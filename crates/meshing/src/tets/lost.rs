@@ -1,7 +1,7 @@
-//! Parts of a body that its mesh lacks. The body as given, voxels or what triangles enclose, is sampled on a
-//! grid. Samples in no tet of the mesh form a thin layer under curved surfaces everywhere, and lumps where a
-//! part is lost: thinner than the cells, torn off, or too small. A lump has samples far from the mesh; the
-//! rest of it follows from there up to where it meets the mesh.
+//! Parts of a body that its mesh lacks. The input body, voxels or the inside of triangles, is sampled on a
+//! grid. Samples in no tet of the mesh form a thin layer under curved surfaces everywhere. They form lumps
+//! where a part is lost: thinner than the cells, torn off, or too small. A lump has samples far from the
+//! mesh; from there it is followed up to where it meets the mesh.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -15,7 +15,7 @@ use crate::tets::complex::Complex;
 /// Steps of the grid along an edge of the cells inside triangles.
 const STEPS_PER_EDGE: f64 = 8.0;
 
-/// Samples of a box at most.
+/// Most samples of a box.
 const MOST_SAMPLES: f64 = (1 << 23) as f64;
 
 /// Parts of a voxel up to this one come from rounding.
@@ -45,12 +45,12 @@ pub(crate) struct Samples {
     grid: Grid,
     /// Material of each sample, 0 outside.
     materials: Vec<u8>,
-    /// How much of the body each sample stands for [voxels]; all of a voxel if empty.
+    /// Part of a voxel in the body that each sample stands for; a whole voxel if empty.
     parts: Vec<f32>,
 }
 
 impl Samples {
-    /// Of a body made of voxels or of triangles, for cells of `edge` [m].
+    /// Samples a body made of voxels or of triangles, for cells of `edge` [m].
     pub(crate) fn of(anatomy: &Anatomy<'_>, edge: f64) -> Option<Self> {
         match anatomy.given()? {
             Given::Voxels { grid, materials } => {
@@ -63,8 +63,8 @@ impl Samples {
         }
     }
 
-    /// Inside triangles, on a grid of `step` [m] or more. Rows along x are cut at the triangles, so parts
-    /// thinner than a step count with their volume on average.
+    /// Samples the inside of triangles, on a grid of `step` [m] or more. Rows along x are cut at the
+    /// triangles, so parts thinner than a step count with their volume on average.
     fn within(points: &[Vector3], triangles: &[[u32; 3]], step: f64) -> Option<Self> {
         let start = *points.first()?;
         let (low, high) = points.iter().fold((start, start), |(low, high), x| (low.inf(x), high.sup(x)));
@@ -120,8 +120,8 @@ impl Samples {
         volumes
     }
 
-    /// Volume of each material among the samples inside a surface [m³]; the outside there counts to the
-    /// material that most of the samples round it have.
+    /// Volume of each material among the samples inside a surface [m³]. Samples of the outside there count to
+    /// the material that most of their neighbours have.
     pub(crate) fn volumes_with_neighbours(&self, inside: &[bool]) -> Vec<f64> {
         let mut volumes = self.volumes(|at| inside[at]);
         for at in (0..inside.len()).filter(|&at| inside[at] && self.materials[at] == 0) {
@@ -171,7 +171,7 @@ impl Samples {
         covered
     }
 
-    /// The parts with samples farther than `far` [m] from those that a mesh holds, the largest first.
+    /// The parts with samples farther than `far` [m] from the samples in the mesh, the largest first.
     pub(crate) fn lost(&self, covered: &[bool], far: f64) -> Vec<LostPart> {
         let is_lost = |at: usize| self.materials[at] > 0 && !covered[at];
         let distances = self.distances(covered);
@@ -260,8 +260,8 @@ impl Samples {
     }
 }
 
-/// Where the rows of a grid along i run within triangles [voxels], row by row. `off` shifts a row along j and
-/// k [voxels].
+/// Intervals of the rows of a grid along i that lie within triangles [voxels], row by row. `off` shifts a row
+/// along j and k [voxels].
 fn inner_rows(
     grid: &Grid,
     points: &[Vector3],
@@ -368,8 +368,7 @@ mod tests {
         }
     }
 
-    /// Two boxes with a neck between, of which the mesh is one tet in the first one, and a layer of it is not
-    /// in the mesh.
+    /// Two boxes with a gap between. The mesh is one tet in the first box, and lacks a thin layer there.
     #[test]
     fn a_lump_is_lost_and_a_thin_layer_is_not() {
         let (points, triangles) = cuboid([0.0; 3], [0.02, 0.02, 0.02]);

@@ -1,9 +1,9 @@
 //! Repairs a body that touches itself: where a gap is thinner than the cells, its two sides share points or
 //! edges. A point is doubled for every group of its tets connected through faces. An edge with more than two
-//! boundary faces is halved first, which gives each side its own point. Where two stretches of the boundary
-//! meet in a point whose tets are connected (a sheet without thickness), one of them gets its own point
-//! slightly further out, with a tet on each of its faces, or the point is taken off. Points in one place then
-//! move apart, each into its own tets, so that the sides have a gap between them.
+//! boundary faces is halved first, which gives each side its own point. Two stretches of the boundary may
+//! meet in a point whose tets are connected (a sheet without thickness). Then one of the two gets its own
+//! point slightly further out, with a tet on each of its faces, or the point is taken off. Points in one
+//! place then move apart, each into its own tets, so that the sides have a gap between them.
 
 use std::collections::BTreeMap;
 
@@ -13,13 +13,13 @@ use crate::surface::edges::key;
 use crate::tets::complex::{Complex, OUTSIDE, acoustic_length};
 use crate::tets::optimise::directions;
 
-/// How far the new point of a pinch may lie from the old one, in lattice constants.
+/// Distances of the new point of a pinch from the old one, in lattice constants.
 const LIFTS: [f64; 5] = [0.5, 0.35, 0.25, 0.15, 0.08];
 
-/// How far points in one place move into their tets, in lattice constants.
+/// Move of points in one place into their tets, in lattice constants.
 const APART: f64 = 0.08;
 
-/// How much of its edges a point takes along where it is taken off.
+/// Part of its edges that a point takes along where it is taken off.
 const DUG: f64 = 0.35;
 
 /// Moving apart must leave tets this part of their acoustic length.
@@ -122,7 +122,7 @@ pub(crate) fn pinched_points(complex: &Complex) -> Vec<u32> {
     (0..complex.points.len() as u32).filter(outer).filter(|&point| fans(complex, point).len() > 1).collect()
 }
 
-/// Boundary faces round a point, outward, in groups that hang together through edges at the point.
+/// Boundary faces round a point, outward, in groups that are connected through edges at the point.
 fn fans(complex: &Complex, point: u32) -> Vec<Vec<[u32; 3]>> {
     let mut rest = complex.rim_of(point, |_| true);
     let meet = |a: &[u32; 3], b: &[u32; 3]| a.iter().any(|node| *node != point && b.contains(node));
@@ -141,8 +141,8 @@ fn fans(complex: &Complex, point: u32) -> Vec<Vec<[u32; 3]>> {
     fans
 }
 
-/// Gives one of the fans round a point a new point further out, and a tet on each of its faces; of all fans
-/// and places the one whose worst new tet is best. False where every one would turn a tet over.
+/// Gives one of the fans round a point a new point further out, and a tet on each of its faces. Of all fans
+/// and places it takes the one whose worst new tet is best. False where every choice would turn a tet over.
 fn part_pinch(complex: &mut Complex, point: u32) -> bool {
     let (here, size) = (complex.points[point as usize], complex.size[point as usize]);
     let mut best: Option<(f64, Vec<[u32; 3]>, Vector3)> = None;
@@ -171,7 +171,7 @@ fn part_pinch(complex: &mut Complex, point: u32) -> bool {
     true
 }
 
-/// Takes a point off with the near thirds of its tets, which joins what its fans bound.
+/// Removes a point with the near thirds of its tets, which joins the spaces that its fans bound.
 fn dig(complex: &mut Complex, point: u32) {
     for other in complex.neighbours(point) {
         let place = complex.points[point as usize].lerp(&complex.points[other as usize], DUG);
@@ -195,7 +195,7 @@ pub(crate) fn crowded_edges(complex: &Complex) -> Vec<[u32; 2]> {
     edges.into_iter().filter(|(_, count)| *count > 2).map(|(edge, _)| edge).collect()
 }
 
-/// Doubles the points whose tets fall into groups; how many points that adds.
+/// Doubles the points whose tets fall into groups. Returns the number of points added.
 fn double_points(complex: &mut Complex, points: std::ops::Range<u32>) -> usize {
     let mut added = 0;
     for point in points {
@@ -220,7 +220,7 @@ fn double_points(complex: &mut Complex, points: std::ops::Range<u32>) -> usize {
     added
 }
 
-/// Tets round a point in groups that hang together through faces with the point; the group of the first tet
+/// Tets round a point in groups that are connected through faces with the point; the group of the first tet
 /// first.
 fn groups(complex: &Complex, point: u32) -> Vec<Vec<u32>> {
     let star = &complex.star[point as usize];
@@ -275,8 +275,7 @@ mod tests {
         }
     }
 
-    /// A ring of tets round an edge with two of them taken out opposite each other: its ends hold the halves
-    /// together.
+    /// A ring of tets round an edge without two opposite ones: its ends hold the halves together.
     #[test]
     fn an_edge_between_halves_that_hang_together_elsewhere_is_halved() {
         let around = |at: usize| {
@@ -327,7 +326,7 @@ mod tests {
         assert_eq!(complex.alive().count(), 12 + 6);
     }
 
-    /// The same plate where no cap fits: a hole joins the cones.
+    /// A plate where no cap fits: a hole joins the cones.
     #[test]
     fn a_point_that_is_taken_off_leaves_a_hole() {
         let mut complex = plate();

@@ -1,7 +1,8 @@
-//! Features of a body that its mesh misses: parts and gaps thinner than the lattice, with their location and
-//! thickness, and other surface points far from the mesh. A part is thin if the straight line through it,
-//! from one point of the surface to the opposite wall, is shorter than the lattice constant. It is missed if
-//! the middle of this line is not in the mesh. Gaps are treated in the same way in the background.
+//! Features of a body that its mesh misses. These are parts and gaps thinner than the lattice, with their
+//! location and thickness, and other surface points far from the mesh. A straight line through a part leads
+//! from one point of the surface to the opposite wall. The part is thin if this line is shorter than the
+//! lattice constant. It is missed if the middle of the line is not in the mesh. Gaps are treated in the same
+//! way in the background.
 
 use std::fmt;
 
@@ -21,8 +22,8 @@ const STEPS: usize = 20;
 /// not count.
 const OPPOSITE: f64 = -0.7;
 
-/// The middle of a thin part is missed if it is this far from the mesh, in lattice constants; if nearer, the
-/// mesh only cuts a crest.
+/// Distance of the middle of a thin part from the mesh, in lattice constants, above which the part is missed.
+/// If nearer, the mesh only cuts a crest.
 const MARGIN: f64 = 0.25;
 
 /// A feature of a body that its mesh misses or misplaces. Locations in metres, RAS if the body comes from an
@@ -34,7 +35,7 @@ pub enum Missed {
     ThinPart {
         /// Its middle [m].
         place: [f64; 3],
-        /// How thick it is there [m].
+        /// Thickness of the part there [m].
         thickness: f64,
         /// Lattice constant [m].
         edge: f64,
@@ -43,7 +44,7 @@ pub enum Missed {
     ThinGap {
         /// Its middle [m].
         place: [f64; 3],
-        /// How wide it is there [m].
+        /// Width of the gap there [m].
         thickness: f64,
         /// Lattice constant [m].
         edge: f64,
@@ -52,7 +53,7 @@ pub enum Missed {
     Beyond {
         /// The point of the mesh's boundary that is farthest from the surface [m].
         place: [f64; 3],
-        /// How far it is [m].
+        /// Distance from the surface [m].
         distance: f64,
     },
     /// A label without a cell.
@@ -60,35 +61,35 @@ pub enum Missed {
         /// The label.
         label: i32,
     },
-    /// A label whose volume differs from that of the input.
+    /// A label whose volume differs from the input.
     LabelVolume {
         /// The label.
         label: i32,
-        /// By which part it is off.
+        /// Relative error of the volume.
         part: f64,
     },
-    /// A label whose surface is far from that of the input.
+    /// A label whose surface is far from its surface in the input.
     LabelAway {
         /// The label.
         label: i32,
         /// The point that is farthest from the other surface [m].
         place: [f64; 3],
-        /// How far it is [m].
+        /// Distance [m].
         distance: f64,
     },
     /// A part of the surface far from the mesh that is not thin: a crest, or a small piece that was left out.
     Behind {
         /// The point of the surface that is farthest from the mesh [m].
         place: [f64; 3],
-        /// How far it is [m].
+        /// Distance from the mesh [m].
         distance: f64,
     },
 }
 
 impl Missed {
-    /// How far [m] the surface of a body may be from a mesh with cells of `edge` [m] before it is reported:
-    /// half an edge of tets; steps of cubes stay behind the body by up to half of their diagonal, and
-    /// immersed ones hold all of it.
+    /// Distance [m] of the surface of a body from a mesh with cells of `edge` [m] above which it is reported.
+    /// For tets it is half an edge. Steps of cubes stay behind the body by up to half of their diagonal.
+    /// Immersed cubes contain the whole body.
     pub(crate) fn allowed(mesh: &Mesh, edge: f64) -> f64 {
         match mesh.block(CellKind::Hex) {
             None => edge / 2.0,
@@ -97,9 +98,10 @@ impl Missed {
         }
     }
 
-    /// Features of the body of a field that a mesh with cells of `edge` [m] misses: the worst thin part, the
-    /// worst thin gap, and the farthest point of the surface if it is farther than `allowed` [m] and no thin
-    /// part explains it, otherwise that of the mesh boundary.
+    /// Features of the body of a field that a mesh with cells of `edge` [m] misses. These are the worst thin
+    /// part and the worst thin gap. The farthest point of the surface follows if it is farther than `allowed`
+    /// [m] and no thin part explains it. If nothing else is found, the farthest point of the mesh boundary
+    /// counts, beyond `allowed`.
     ///
     /// # Errors
     /// If the box of the field is empty or not finite.
@@ -117,7 +119,7 @@ impl Missed {
             let surface = boundary(mesh);
             let faces: Vec<u32> = (0..surface.faces.len() as u32).collect();
             let rim = SurfaceLocator::new(&surface, &faces, &mesh.points);
-            // By how much the mesh misses the middle of a way.
+            // Distance by which the mesh misses the middle of a way.
             let by = |way: &ThinWay| {
                 let covered = locator.locate(way.middle).is_some_and(|found| found.distance == 0.0);
                 let far =
@@ -202,7 +204,7 @@ impl fmt::Display for Missed {
 struct ThinWay {
     middle: Vector3,
     length: f64,
-    /// Through the body; else through the background.
+    /// True through the body, false through the background.
     inside: bool,
 }
 

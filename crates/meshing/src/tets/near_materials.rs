@@ -1,6 +1,6 @@
-//! The materials near a point of a body made of voxels. Each field of theirs is a signed distance that is
-//! positive in a box; where the box is far, the point is in another material. Without it, cutting out n
-//! materials takes n² fields at each point.
+//! The materials near a point of a body made of voxels. The field of each material is a signed distance that
+//! is positive only within a box. Where this box is far, the point is in another material. Without this
+//! search, cutting out n materials takes n² fields at each point.
 
 use pliant_geometry::Vector3;
 
@@ -23,8 +23,8 @@ pub(crate) struct NearMaterials {
 }
 
 impl NearMaterials {
-    /// Of a body for cells of `edge` [m]; a material counts in its box and an edge round it. In bodies of
-    /// functions each counts everywhere.
+    /// Sorts the materials of a body by place, for cells of `edge` [m]. A material counts in its box and an
+    /// edge round it. In bodies of functions each counts everywhere.
     pub(crate) fn new(anatomy: &Anatomy<'_>, edge: f64) -> Self {
         let materials = anatomy.labels().len();
         let everywhere = Self {
@@ -73,7 +73,7 @@ impl NearMaterials {
         own.iter().copied().chain(all)
     }
 
-    /// Whether a point is outside of the box of a material and an edge round it.
+    /// True if a point is outside of the box of a material and an edge round it.
     pub(crate) fn is_far(&self, material: usize, point: &Vector3) -> bool {
         self.boxes
             .get(material - 1)

@@ -1,9 +1,9 @@
 //! A body-centred cubic lattice of cubes of several sizes, after Labelle and Shewchuk (2007). Cubes are
 //! halved where cells must be smaller; neighbours, also across edges and corners, differ by at most one
-//! halving. Equal cubes have the tets of the uniform lattice between them, halved where one of their edges
-//! is. A cube and four smaller ones have pyramids from the centres over the four squares between them, each
-//! halved along the diagonal that starts in the middle of the larger square. Cubes of level 0 are the
-//! smallest; those of level n are 2ⁿ as long.
+//! halving. Equal cubes have the tets of the uniform lattice between them; a tet is halved where one of its
+//! edges is. Where a cube meets four smaller ones, pyramids lead from the centres over the four squares
+//! between. Each pyramid is halved along the diagonal that starts in the middle of the larger square. Cubes
+//! of level 0 are the smallest; cubes of level n are 2ⁿ as long.
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -92,7 +92,7 @@ impl Octree {
         }
     }
 
-    /// The same with all cubes round it.
+    /// Demands a level in all cubes round a cube, like [`Self::demand`].
     pub(crate) fn demand_round(&mut self, level: usize, cube: Cube) {
         around(cube).for_each(|cube| self.demand(level, cube));
     }
@@ -106,7 +106,7 @@ impl Octree {
         }
     }
 
-    /// Whether a cube is there, halved or not.
+    /// True if a cube is there, halved or not.
     fn is_there(&self, level: usize, cube: Cube) -> bool {
         self.contains(level, cube)
             && (level == self.top || self.split[level + 1].contains(&cube.map(|i| i >> 1)))
@@ -116,7 +116,7 @@ impl Octree {
         self.split[level].contains(&cube)
     }
 
-    /// The cubes that are not halved, in the order of the largest ones and of the halves in these.
+    /// The cubes that are not halved, in the order of the largest cubes and of the halves within each.
     pub(crate) fn leaves(&self) -> Vec<(usize, Cube)> {
         let [nx, ny, nz] = self.roots;
         let mut ahead: Vec<(usize, Cube)> = Vec::new();
@@ -292,8 +292,8 @@ mod tests {
     use super::*;
     use crate::tets::complex::acoustic_length;
 
-    /// Cubes of three sizes: every face that is not on the rim of the box has two tets, volumes add up, and
-    /// no tet is below 0.89 of the ideal one of the smallest cube at its corners.
+    /// Cubes of three sizes. Every face that is not on the rim of the box has two tets, and volumes add up.
+    /// No tet is below 0.89 of the ideal one of the smallest cube at its corners.
     #[test]
     fn cubes_of_several_sizes_make_a_lattice_that_fits() {
         let mut tree = Octree::over(&Vector3::zeros(), &Vector3::repeat(3.0), 0.25, 2, &Vector3::zeros());
@@ -316,7 +316,7 @@ mod tests {
             }
         }
         assert!(least > 0.89, "{least}");
-        // Faces on the rim: two corners of the box's square and a centre. They bound what is missing of the
+        // Faces on the rim: two corners of the box's square and a centre. They bound the missing parts of the
         // outermost cubes.
         let [low, high] = [0, 1].map(|end| {
             let counts = tree.counts(2).map(|n| end * n);
@@ -329,7 +329,7 @@ mod tests {
         for (face, count) in &faces {
             assert!(*count == 2 || *count == 1 && face.iter().all(|&node| on_rim(node)), "{face:?}: {count}");
         }
-        // What is missing are the pyramids over the squares of the box: a sixth of each outermost cube.
+        // The missing parts are the pyramids over the squares of the box: a sixth of each outermost cube.
         let counts = tree.counts(2);
         let squares = 2 * (counts[0] * counts[1] + counts[1] * counts[2] + counts[2] * counts[0]);
         let whole = f64::from(counts[0] * counts[1] * counts[2]);

@@ -24,14 +24,14 @@ const AIM: f64 = 1.07;
 /// The threshold reaches its goal in this part of the rounds.
 const RAMP: f64 = 0.6;
 
-/// Sweeps over the points in a round, and by how much trial moves shrink from one to the next.
+/// Sweeps over the points in a round, and the factor by which trial moves shrink from sweep to sweep.
 const SWEEPS: usize = 3;
 const SHRINK: f64 = 0.6;
 
 /// First trial moves, in lattice constants.
 const REACH: f64 = 0.15;
 
-/// How far surfaces may be shifted, in lattice constants.
+/// Largest shift of surfaces, in lattice constants.
 const LARGEST_SHIFT: f64 = 0.25;
 
 /// Sweeps that slide points to follow a surface, and their first moves in lattice constants.
@@ -41,14 +41,15 @@ const FIT_REACH: f64 = 0.25;
 /// Faces that follow their surface this well (root mean square, in lattice constants) stay.
 const FIT_ENOUGH: f64 = 0.01;
 
-/// If the target is not reached, points around bad tets may leave their surfaces by this, in lattice
-/// constants; the last value applies only if the target itself is not reached.
+/// Distances, in lattice constants, by which points around bad tets may leave their surfaces. They apply in
+/// turn while the aim, a little above the target, is not reached. The last applies only if the target itself
+/// is not reached.
 const SLACKS: [f64; 3] = [0.03, 0.06, 0.12];
 
 /// Boundary edges may flip if the new one is at most this far from the surface, in lattice constants.
 const FLIP_OFF: f64 = 0.03;
 
-/// Inner points are moved at last where their worst tet is below this, in ideal acoustic lengths: it raised τ
+/// Worst tet, in ideal acoustic lengths, below which inner points are moved at the end. These moves raised τ
 /// of the liver phantom at 10 mm from 0.63 to 0.66 on average.
 const POLISH: f64 = 0.9;
 
@@ -62,7 +63,7 @@ pub struct Steps {
     pub rounds: usize,
     /// Tets taken off the boundary.
     pub peeled: usize,
-    /// Flat tets between materials given to the other one.
+    /// Flat tets between materials moved to the other material.
     pub given: usize,
     /// Edges collapsed.
     pub collapsed: usize,
@@ -78,9 +79,9 @@ pub(crate) struct Optimiser<'a> {
     surfaces: Surfaces<'a>,
     /// Tolerated distance of a point from the sides it lies between, in lattice constants.
     slack: f64,
-    /// Whether points where three materials meet, or two and the outside, only keep to the outside.
+    /// True if points where three materials meet, or two and the outside, only keep to the outside.
     lines_are_free: bool,
-    /// Rejects what would let the boundary intersect itself, if it is there.
+    /// Rejects changes that would let the boundary intersect itself, if present.
     guard: Option<Guard>,
     noise: u64,
     done: Steps,
@@ -92,7 +93,7 @@ impl<'a> Optimiser<'a> {
         Self { complex, surfaces, slack, lines_are_free, guard, noise: 1, done }
     }
 
-    /// Whether a point may move to `place`.
+    /// True if a point may move to `place`.
     fn lets_move(&self, node: u32, place: &Vector3) -> bool {
         self.guard.as_ref().is_none_or(|guard| guard.lets_move(self.complex, node, place))
     }
@@ -102,16 +103,16 @@ impl<'a> Optimiser<'a> {
         self.note(&[node]);
     }
 
-    /// Takes note of changes round points.
+    /// Records changes round points.
     fn note(&mut self, nodes: &[u32]) {
         if let Some(guard) = &mut self.guard {
             guard.note(self.complex, nodes);
         }
     }
 
-    /// Up to `rounds` rounds towards a least acoustic length of `target` × ideal, then surfaces shifted until
-    /// the mesh encloses the volumes [m³] of the whole and of the inner materials, as far as these are known;
-    /// `volumes` gives them for the mesh before.
+    /// Runs up to `rounds` rounds towards a least acoustic length of `target` × ideal. Then it shifts
+    /// surfaces until the mesh encloses the volumes [m³] of the whole and of the inner materials, as far as
+    /// these are known. `volumes` gives them for the mesh before the shifts.
     pub(crate) fn run(
         &mut self,
         target: f64,
@@ -149,7 +150,7 @@ impl<'a> Optimiser<'a> {
         self.done
     }
 
-    /// Shifts the surfaces whose volume is off, and their points with them; whether any was.
+    /// Shifts the surfaces whose volume is off, together with their points. Returns whether any was shifted.
     fn shift_surfaces(&mut self, volumes: &[Option<f64>], target: f64) -> bool {
         let measured = measure(self.complex, self.surfaces.materials());
         let mut shifted = 0;
@@ -216,7 +217,7 @@ impl<'a> Optimiser<'a> {
         }
     }
 
-    /// Acoustic length of each tet as a part of the ideal; infinite where there is none any more.
+    /// Acoustic length of each tet as a part of the ideal; infinite for removed tets.
     fn parts(&self) -> Vec<f64> {
         let part = |tet: u32| if self.complex.is_alive(tet) { self.complex.part(tet) } else { f64::INFINITY };
         (0..self.complex.tets.len() as u32).into_par_iter().map(part).collect()
@@ -237,8 +238,8 @@ impl<'a> Optimiser<'a> {
         bad.into_iter().map(|(_, tet)| tet).collect()
     }
 
-    /// Removes tets of the boundary that the body does not need to hang together: those below half the
-    /// threshold, and tips that are light for their stiffness.
+    /// Removes tets of the boundary that the body does not need to stay connected. These are tets below half
+    /// the threshold, and tips that are light for their stiffness.
     fn peel(&mut self, threshold: f64) {
         let mut peeled = 0;
         let short = |node: &u32| self.nodal_part(*node, &self.complex.points[*node as usize]) < threshold;
@@ -325,7 +326,7 @@ impl<'a> Optimiser<'a> {
         let mut collapsed = 0;
         for tet in self.below(threshold) {
             let nodes = self.complex.tets[tet as usize];
-            // A collapse before may have taken it away or improved it.
+            // An earlier collapse may have removed or improved the tet.
             if self.complex.is_alive(tet)
                 && self.complex.part(tet) < threshold
                 && self.collapse_one(nodes, threshold)
@@ -385,7 +386,7 @@ impl<'a> Optimiser<'a> {
         false
     }
 
-    /// Where the joined point would be best, if that is better than before.
+    /// Best place of the joined point, if that is better than before.
     fn best_collapse(&self, gone: u32, kept: u32, threshold: f64) -> Option<Vector3> {
         let [own, other] = [gone, kept].map(|node| self.complex.sides[node as usize]);
         if own & !other != 0 {
@@ -417,19 +418,18 @@ impl<'a> Optimiser<'a> {
         best.map(|(_, place)| place)
     }
 
-    /// Parts of the ideal length that a node at `place` is responsible for: the least of its tets, and its
-    /// own.
+    /// Parts of the ideal length of a node at `place`: the least of its tets, and its nodal length.
     fn parts_round(&self, node: u32, place: &Vector3) -> [f64; 2] {
         [self.star_min(node, place, u32::MAX, 0.0), self.nodal_part(node, place)]
     }
 
-    /// The length that a node would bear on its own at `place`, as a part of the ideal one.
+    /// Nodal acoustic length of a node at `place`, as a part of the ideal one.
     fn nodal_part(&self, node: u32, place: &Vector3) -> f64 {
         self.complex.nodal_length(node, place) / self.complex.ideal([node; 4])
     }
 
-    /// Least acoustic length of the tets round a node if it were at `place` as a part of the ideal, leaving
-    /// out those with another node; stops once it is not above `floor`.
+    /// Least acoustic length of the tets round a node if it were at `place`, as a part of the ideal. Tets
+    /// with the node `without` are left out. The search stops once the length is not above `floor`.
     fn star_min(&self, node: u32, place: &Vector3, without: u32, floor: f64) -> f64 {
         let mut least = f64::INFINITY;
         for &tet in &self.complex.star[node as usize] {
@@ -446,13 +446,14 @@ impl<'a> Optimiser<'a> {
         least
     }
 
-    /// The position nearest to `place` between the sides of a node, if it is on the same side of the body:
-    /// the normals differ by less than 90°. The other side of a gap or of a thin lobe may be nearer.
+    /// The position nearest to `place` between the sides of a node, if it is on the same side of the body. On
+    /// that side the normals differ by less than 90°. The other side of a gap or of a thin lobe may be
+    /// nearer.
     fn project(&self, node: u32, place: Vector3) -> Option<Vector3> {
         self.project_from(node, place, &OnceCell::new())
     }
 
-    /// The same; `look` is the normal at the node, found once for several places.
+    /// Projects like [`Self::project`]; `look` is the normal at the node, found once for several places.
     fn project_from(&self, node: u32, place: Vector3, look: &OnceCell<Vector3>) -> Option<Vector3> {
         let mut sides = self.complex.sides[node as usize];
         if self.lines_are_free && sides.count_ones() > 2 {
@@ -477,7 +478,7 @@ impl<'a> Optimiser<'a> {
     }
 
     /// Slides points along their surface to where its facets follow the field best, as long as no tet falls
-    /// below the target; `reach` in lattice constants. What falls short of a crest moves onto it.
+    /// below the target; `reach` is in lattice constants. Points that fall short of a crest move onto it.
     fn fit(&mut self, target: f64, reach: f64) {
         for node in 0..self.complex.points.len() as u32 {
             if self.complex.sides[node as usize].count_ones() == 2 {
@@ -522,8 +523,9 @@ impl<'a> Optimiser<'a> {
         }
     }
 
-    /// Sum of area × mean squared distance from the surface over the faces round a node if it were at `place`
-    /// [m⁴], taken at the middle of each face and of its edges at the node; and the area [m²].
+    /// Misfit of the faces round a node if it were at `place`: sum of area × mean squared distance from the
+    /// surface [m⁴]. The mean is over the middle of each face and of its edges at the node. Also returns the
+    /// area [m²].
     fn misfit(&self, node: u32, place: &Vector3, faces: &[[u32; 3]]) -> [f64; 2] {
         let sides = self.complex.sides[node as usize];
         let of_face = |face: &[u32; 3]| {
@@ -555,7 +557,7 @@ impl<'a> Optimiser<'a> {
         }
     }
 
-    /// Moves a point; `parts` are those of all tets, before and after.
+    /// Moves a point; `parts` are the acoustic lengths of all tets over the ideal, before and after.
     fn relocate_one(&mut self, node: u32, now: f64, reach: f64, parts: &mut [f64]) {
         let here = self.complex.points[node as usize];
         let neighbours = self.complex.neighbours(node);
@@ -568,7 +570,7 @@ impl<'a> Optimiser<'a> {
         let (mut best, mut place) = (now, here);
         let look = OnceCell::new();
         for trial in std::iter::once(half_way).chain(directions().map(|direction| here + direction * reach)) {
-            // Free trials without improvement are not worth projecting: their tets change little.
+            // Each trial is projected between the sides of the node, and must then improve the worst tet.
             if let Some(trial) = self.project_from(node, trial, &look) {
                 let part = self.star_min(node, &trial, u32::MAX, best);
                 if part > best

@@ -1,7 +1,7 @@
-//! From an anatomy to tetrahedra that an explicit solver can take large steps with: isosurface stuffing of
-//! the whole body, its materials cut out, banks that touch parted, then the optimiser. Rules and thresholds:
-//! the project's meshing specification 1.3. Cells of several sizes, and cells made smaller until a distance
-//! is held: `grading.rs`.
+//! From an anatomy to tetrahedra that allow an explicit solver large steps. The whole body is filled by
+//! isosurface stuffing, its materials are cut out, banks that touch are parted, then the optimiser runs.
+//! Rules and thresholds: the project's meshing specification 1.3. Cells of several sizes, and cells made
+//! smaller until a distance is held: `grading.rs`.
 
 use std::fmt;
 
@@ -26,13 +26,13 @@ use crate::tets::octree::{Octree, around};
 use crate::tets::optimise::{Optimiser, Steps};
 use crate::tets::request::{OrganTets, SMALLEST_PART};
 
-/// Meshes made at most until a distance is held.
+/// Most meshes made until a distance is held.
 const MOST_PASSES: usize = 8;
 
-/// Lost parts of less than this part of the body are not named.
+/// Lost parts below this part of the body's volume are not named.
 const LEAST_LOST: f64 = 1e-4;
 
-/// Lost parts that are listed.
+/// Number of lost parts that are listed.
 const LISTED: usize = 3;
 
 /// Cells may be halved this often where a thin part would be torn.
@@ -87,7 +87,7 @@ impl OrganTets {
             is_final |= pass + 1 >= MOST_PASSES;
             let (filled, tree) = match self.whole(anatomy, &levels, &mut wanted) {
                 Err(MeshingError::TooManyCells { .. }) if best.is_some() => break,
-                // The one before fits, and is finished.
+                // The mesh before it fits, and is finished.
                 Err(MeshingError::TooManyCells { .. }) if pass > 0 && !wanted.eq(&coarser) => {
                     (wanted, is_final) = (coarser.clone(), true);
                     continue;
@@ -142,8 +142,8 @@ impl OrganTets {
         }
     }
 
-    /// A body filled with tets of several sizes, smaller ones than `wanted` where thin parts would be torn;
-    /// and the lattice.
+    /// Fills a body with tets of several sizes, smaller than `wanted` where thin parts would be torn. Also
+    /// returns the lattice.
     fn whole(
         &self,
         anatomy: &Anatomy<'_>,
@@ -179,7 +179,7 @@ impl OrganTets {
         Ok(Filled::of(complex, self.smallest_piece, anatomy.field()))
     }
 
-    /// Cuts materials out, parts what touches, and optimises.
+    /// Cuts materials out, parts banks that touch, and optimises.
     fn finished(
         &self,
         filled: Filled,
@@ -231,9 +231,9 @@ impl OrganTets {
         Ok(OrganMesh { mesh, report })
     }
 
-    /// Halves long edges and optimises; how many were halved, and the steps. Few bodies have banks that could
-    /// meet, and guarding all moves takes long: it is done where the body touched itself (`is_tight`), or
-    /// where the result intersects itself without.
+    /// Halves long edges and optimises. Returns the number of halved edges, and the steps. Few bodies have
+    /// banks that could meet, and guarding all moves takes long. Moves are guarded where the body touched
+    /// itself (`is_tight`), or where the result intersects itself without a guard.
     fn improved(
         &self,
         mut complex: Complex,
@@ -282,8 +282,8 @@ fn finer(wanted: &mut Wanted, tree: &Octree, measured: &Measured, distance: f64)
     wanted.len() > before
 }
 
-/// Volume of the whole and of each inner material [m³], where known, without what a mesh lacks: the rest must
-/// not grow for it.
+/// Volume of the whole and of each inner material [m³], where known, less the parts that a mesh lacks.
+/// Otherwise the rest would grow to compensate.
 fn wanted_volumes(anatomy: &Anatomy<'_>, lost: &[LostPart]) -> Vec<Option<f64>> {
     let mut volumes = anatomy.volumes().to_vec();
     for part in lost {
@@ -304,7 +304,7 @@ fn labelled(points: Vec<Vector3>, nodes: Vec<u32>, material: &[u8], labels: &[i3
     mesh
 }
 
-/// A mesh of an anatomy, and what there is to know about it.
+/// A mesh of an anatomy, with its report.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OrganMesh {
     /// One block of tets with the cell data `label`.
@@ -326,7 +326,7 @@ pub struct Repairs {
     pub crowded_edges: usize,
     /// Points doubled so that banks of a thin gap can slide.
     pub doubled_points: usize,
-    /// Edges halved to that end.
+    /// Edges halved for this doubling.
     pub halved_edges: usize,
     /// Points where the boundary met itself, each doubled.
     pub parted_points: usize,
@@ -337,7 +337,7 @@ pub struct Repairs {
 }
 
 impl Repairs {
-    /// The lines of those that were needed.
+    /// Writes the lines of the repairs that were made.
     fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             dropped_pieces,
@@ -422,7 +422,7 @@ struct OfComplex {
 /// A part of a body that its mesh lacks: thinner than the cells, torn off, or too small.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LostReport {
-    /// Label of most of it.
+    /// Label of the largest share of its volume.
     pub label: i32,
     /// Its volume [m³].
     pub volume: f64,
@@ -431,7 +431,7 @@ pub struct LostReport {
 }
 
 impl LostReport {
-    /// Of the parts of labels that are not negligible in a body of a volume [m³].
+    /// Names the lost parts that are not negligible in a body of a volume [m³].
     pub(crate) fn of(parts: Vec<LostPart>, labels: &[i32], whole: f64) -> Vec<Self> {
         let named = |part: LostPart| {
             let most = (0..part.volumes.len()).max_by(|&a, &b| part.volumes[a].total_cmp(&part.volumes[b]));
@@ -461,9 +461,9 @@ impl LostReport {
 /// Thin parts of a body that a mesh tears.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Tears {
-    /// How many.
+    /// Number of tears.
     pub number: usize,
-    /// Where the first is [m].
+    /// Place of the first [m].
     pub first: Option<[f64; 3]>,
 }
 
@@ -474,7 +474,7 @@ pub struct DistanceReport {
     pub asked: f64,
     /// Largest distance both ways [m].
     pub reached: f64,
-    /// How often cells were made until then.
+    /// Number of times that cells were made.
     pub passes: usize,
     /// The reference of the distance.
     pub to: MeasuredTo,
@@ -524,9 +524,9 @@ pub struct TetReport {
     pub materials: Vec<MaterialReport>,
     /// Least acoustic length [m]: a step of this over the speed of pressure waves is stable.
     pub acoustic_length: f64,
-    /// The smallest one over that of the local ideal tet.
+    /// The smallest acoustic length of a tet over the local ideal.
     pub acoustic_part: f64,
-    /// That part before the optimiser.
+    /// Smallest acoustic length before the optimiser, over the local ideal.
     pub raw_acoustic_part: f64,
     /// Median acoustic length [m].
     pub median_acoustic_length: f64,
@@ -653,7 +653,7 @@ impl TetReport {
         }
     }
 
-    /// The lines of what its cells are like.
+    /// Writes the lines on the cells.
     fn write_cells(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "nodes            {}", self.nodes)?;
         writeln!(f, "tets             {}", self.tets)?;
@@ -698,7 +698,7 @@ impl TetReport {
         )
     }
 
-    /// The lines of what is not as in the body.
+    /// Writes the lines on differences from the body.
     fn write_flaws(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(lost) = LostReport::in_words(&self.lost) {
             writeln!(f, "lost             {lost}")?;
@@ -747,8 +747,8 @@ impl fmt::Display for TetReport {
 mod tests {
     use super::*;
 
-    /// A small cell among even ones costs as much as it is smaller; where small cells are everywhere, no
-    /// place does.
+    /// The factor of a small cell among even ones is the ratio of their sizes. Where small cells are
+    /// everywhere, no place is costly.
     #[test]
     fn a_place_costs_what_its_cells_shorten_the_step_by() {
         let row = |least: f64| -> Vec<(Vector3, f64)> {

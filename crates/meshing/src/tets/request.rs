@@ -10,7 +10,7 @@ pub(crate) const SMALLEST_PART: f64 = 1.0 / 64.0;
 /// A request for tetrahedra of an anatomy.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OrganTets {
-    /// Lattice constant [m]: the long edges of the inner tetrahedra; the short ones are √3/2 of it.
+    /// Lattice constant [m]: the long edges of the inner tetrahedra; the short edges are √3/2 times as long.
     pub edge: f64,
     /// Lattice constant inside, away from the surface [m], if larger: the largest `edge` × 2ⁿ up to this
     /// value.
@@ -51,14 +51,14 @@ impl OrganTets {
         }
     }
 
-    /// The initial edge [m] if only a distance [m] is given, from the box of the body [m]: the chord √(8 R d)
-    /// that is a distance d off an arc, whose radius R is a quarter of the shortest side of the box.
+    /// The initial edge [m] if only a distance [m] is given, from the box of the body [m]. It is the chord
+    /// √(8 R d) that is a distance d off an arc. The radius R of the arc is a quarter of the shortest side of
+    /// the box.
     pub fn edge_for(distance: f64, [low, high]: [Vector3; 2]) -> f64 {
         (2.0 * (high - low).min() * distance).sqrt().min((high - low).norm() / 15.0)
     }
 
-    /// The same with labels that have smaller cells: of the edge given [m], or else of half the edge of the
-    /// others.
+    /// Gives labels smaller cells: of the edge given [m], or else of half the edge of the others.
     pub fn protecting(self, labels: &[(i32, Option<f64>)]) -> Self {
         let own = |&(label, edge): &(i32, Option<f64>)| (label, edge.unwrap_or(self.edge / 2.0));
         Self { protect: labels.iter().map(own).collect(), ..self }

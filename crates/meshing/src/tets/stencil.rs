@@ -1,14 +1,14 @@
 //! Step 4 of isosurface stuffing: the part of one lattice tetrahedron inside the body, as tetrahedra. Quads
-//! shared by two tetrahedra get a diagonal that depends on the face alone, so the pieces fit. Of two rules
-//! for faces with a long cut edge, this one gave the organs the larger smallest acoustic length at 10 and 8
-//! mm; the opposite one bounds dihedral angles better.
+//! shared by two tetrahedra get a diagonal that depends on the face alone, so the pieces fit. There are two
+//! rules for faces with a long cut edge. This one gave the organs the larger minimum of the acoustic length
+//! at 10 and 8 mm. The opposite one bounds dihedral angles better.
 
 use crate::tets::lattice::{Triple, is_long};
 
 /// A corner of a lattice tetrahedron.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Corner {
-    /// Where it is in the lattice (before warping).
+    /// Position in the lattice (before warping).
     pub(crate) triple: Triple,
     /// Its node.
     pub(crate) node: u32,
@@ -55,9 +55,9 @@ impl Pieces {
 }
 
 /// The face (p inside, q inside, n outside) leaves a quad p, q and two cuts. True if its diagonal starts at p
-/// (and ends at the cut of qn), false if at q. It starts where the long cut edge starts; if both cut edges
-/// are short, at the one of p and q with an even number of coordinates greater than those of n (p and q then
-/// differ in one coordinate).
+/// (and ends at the cut of qn), false if at q. The diagonal starts where the long cut edge starts. If both
+/// cut edges are short, p and q differ in one coordinate. Then it starts at p or q, whichever has an even
+/// number of coordinates greater than the coordinates of n.
 fn starts_at_first(p: Corner, q: Corner, n: Corner) -> bool {
     let greater = (0..3).filter(|&axis| p.triple[axis] > n.triple[axis]).count();
     match (is_long(p.triple, n.triple), is_long(q.triple, n.triple)) {
@@ -78,9 +78,10 @@ fn pyramid(p: Corner, q: Corner, apex: u32, cut_p: u32, cut_q: u32, from_p: bool
 }
 
 /// Two corners inside (p, q), two outside (m, n): a prism between the triangles at p and at q. Its third quad
-/// lies on the surface. In this lattice the diagonals of the other two start at different ones of p and q,
-/// which leaves one choice for the third: of the cut edges either none is long, and the parities with m and n
-/// differ since these differ by one coordinate; or two opposite ones are, one at p and one at q.
+/// lies on the surface. In this lattice the diagonals of the other two quads start at different ends, one at
+/// p and one at q. This leaves one choice for the third. Proof: if no cut edge is long, the parities with m
+/// and n differ, since m and n differ by one coordinate. Otherwise two opposite cut edges are long, one at p
+/// and one at q.
 fn wedge([p, q]: [Corner; 2], [m, n]: [Corner; 2], cut: impl Fn(Corner, Corner) -> u32) -> Pieces {
     let bottom = [p.node, cut(p, m), cut(p, n)];
     let top = [q.node, cut(q, m), cut(q, n)];

@@ -1,10 +1,10 @@
-//! Tetrahedra in the body of a field by isosurface stuffing, after Labelle and Shewchuk (2007): a
-//! body-centred cubic lattice, warped so that no cut is too near a lattice point, then cut along the surface.
-//! Five steps: lattice, cut points, warp, stencils (`stencil.rs`), largest component (`topology.rs`). Two
-//! things differ from the paper. All points are warped at once, so their order does not matter. The diagonals
-//! of `stencil.rs` favour the time step, so the paper's bound of 10.8° on dihedral angles does not hold: the
-//! smallest observed is 8.2° (brain at 5 mm; example `measure`). Leaves out: grading; the later steps of
-//! `organ.rs` (optimisation, materials, repair of non-manifold edges).
+//! Tetrahedra in the body of a field by isosurface stuffing, after Labelle and Shewchuk (2007). A
+//! body-centred cubic lattice is warped so that no cut is too near a lattice point, then cut along the
+//! surface. Five steps: lattice, cut points, warp, stencils (`stencil.rs`), largest component
+//! (`topology.rs`). Two things differ from the paper. All points are warped at once, so their order does not
+//! matter. The diagonals of `stencil.rs` favour the time step, so the paper's bound of 10.8° on dihedral
+//! angles does not hold. The smallest observed is 8.2° (brain at 5 mm; example `measure`). Leaves out:
+//! grading; the later steps of `organ.rs` (optimisation, materials, repair of non-manifold edges).
 
 use pliant_geometry::{CellKind, Vector3};
 use rayon::prelude::*;
@@ -20,7 +20,7 @@ use crate::{DEFAULT_CELL_LIMIT, FieldMesh};
 /// A cut nearer to the end of a long edge than this fraction of the edge warps that end onto the surface.
 const ALPHA_LONG: f64 = 0.24999;
 
-/// The same for short edges.
+/// The corresponding fraction for short edges.
 const ALPHA_SHORT: f64 = 0.41189;
 
 /// Bisections of an edge to find its cut: to 6e-8 of its length.
@@ -32,7 +32,7 @@ const UNMOVED: u32 = u32::MAX;
 /// A request for tetrahedra by isosurface stuffing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stuffing {
-    /// Lattice constant [m]: the long edges of the inner tetrahedra; the short ones are √3/2 of it.
+    /// Lattice constant [m]: the long edges of the inner tetrahedra; the short edges are √3/2 times as long.
     pub edge: f64,
     /// A lattice point [m]; the centre of the box of the body if `None`.
     pub origin: Option<Vector3>,
@@ -52,8 +52,8 @@ impl Stuffing {
         Ok(largest_component(CellKind::Tet, &tets, |node| warped.position(node)))
     }
 
-    /// The same with all components of at least this part of the largest one's cells, and how many cells and
-    /// components less that leaves out.
+    /// Fills the body and keeps all components with at least the part `smallest` of the cells of the largest
+    /// one. The result also counts the cells and components left out.
     pub(crate) fn parts(
         &self,
         field: &(impl ImplicitField + ?Sized),
@@ -109,7 +109,7 @@ fn sign_of(value: f64) -> i8 {
     i8::from(value > 0.0) - i8::from(value < 0.0)
 }
 
-/// Where the surface crosses an edge of the lattice.
+/// Crossing of the surface and an edge of the lattice.
 #[derive(Clone, Copy)]
 struct Cut {
     /// The edge, numbered by the lattice.
@@ -121,7 +121,7 @@ struct Cut {
 }
 
 impl Cut {
-    /// Bisects the field, not an interpolant of it.
+    /// Bisects the field itself, not an interpolant.
     fn find(lattice: &Lattice, field: &(impl ImplicitField + ?Sized), edge: u64, ends: [Triple; 2]) -> Self {
         let [start, end] = ends.map(|triple| lattice.position(triple));
         let begins_inside = field.value(&start) > 0.0;
@@ -177,15 +177,15 @@ struct Warped {
     lattice: Lattice,
     /// Sign class of each lattice point; 0 for moved ones.
     sign: Vec<i8>,
-    /// All cuts, by increasing edge. Cuts of edges with a moved end are no longer nodes.
+    /// Cuts, by increasing edge. Cuts of edges with a moved end are not nodes.
     cuts: Vec<Cut>,
     /// The cut that each lattice point was moved to, or `UNMOVED`.
     moved_to: Vec<u32>,
 }
 
 impl Warped {
-    /// Each cut is too near to at most one end (α < ½) and a point moves to its nearest cut, the first
-    /// among equals: the order of the points does not matter.
+    /// Moves points to cuts. Each cut is too near to at most one end (α < ½), and a point moves to its
+    /// nearest cut, the first among equals. So the order of the points does not matter.
     fn new(lattice: Lattice, mut sign: Vec<i8>, field: &(impl ImplicitField + ?Sized)) -> Self {
         let cuts = find_cuts(&lattice, &sign, field);
         let mut moved_to = vec![UNMOVED; sign.len()];

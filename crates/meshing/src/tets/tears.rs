@@ -31,18 +31,18 @@ const SAMPLES: u32 = 20;
 pub(crate) struct Tear {
     /// Centres of the faces round it [m], and points of the body between them.
     pub(crate) places: Vec<Vector3>,
-    /// How thick the part is there [m].
+    /// Thickness of the part there [m].
     pub(crate) thickness: f64,
 }
 
 /// Faces that cut through the body.
 struct Band {
-    /// Centres of the faces [m], and of all of them.
+    /// Centres of the faces [m], and their mean.
     centres: Vec<Vector3>,
     middle: Vector3,
     /// Sum of their outward normals by area [m²].
     towards: Vector3,
-    /// Whether it looks into a hole that it goes round, or into a void that touches a side of the part in an
+    /// True if it looks into a hole that it goes round, or into a void that touches a side of the part in an
     /// edge.
     is_round: bool,
     thickness: f64,
@@ -65,7 +65,7 @@ pub(crate) fn tears(complex: &Complex, field: &dyn ImplicitField) -> Vec<Tear> {
     tears
 }
 
-/// Faces of the boundary that cut through the body, in groups that hang together by edges.
+/// Faces of the boundary that cut through the body, in groups that are connected by edges.
 fn cuts(complex: &Complex, field: &dyn ImplicitField) -> Vec<Vec<[u32; 3]>> {
     let is_cut = |face: &[u32; 3]| {
         let corners = face.map(|node| complex.points[node as usize]);
@@ -123,7 +123,7 @@ impl Band {
     }
 }
 
-/// Whether a mesh holds one of some points.
+/// True if a mesh holds one of some points.
 fn holds_any(complex: &Complex, points: &[Vector3]) -> bool {
     let start = [points[0]; 2];
     let [low, high] = points.iter().fold(start, widened);
@@ -149,7 +149,7 @@ fn edges(&[a, b, c]: &[u32; 3]) -> [[u32; 2]; 3] {
     [key(a, b), key(b, c), key(c, a)]
 }
 
-/// Faces in groups that hang together by edges, in the order of their first faces.
+/// Faces in groups that are connected by edges, in the order of their first faces.
 fn groups(faces: &[[u32; 3]]) -> Vec<Vec<[u32; 3]>> {
     let mut of_edge: BTreeMap<[u32; 2], Vec<usize>> = BTreeMap::new();
     for (number, face) in faces.iter().enumerate() {

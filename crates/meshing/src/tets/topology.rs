@@ -13,9 +13,9 @@ const TET_FACES: [&[usize]; 4] = [&[1, 2, 3], &[0, 3, 2], &[0, 1, 3], &[0, 2, 1]
 const HEX_FACES: [&[usize]; 6] =
     [&[0, 3, 2, 1], &[4, 5, 6, 7], &[0, 1, 5, 4], &[2, 3, 7, 6], &[1, 2, 6, 5], &[0, 4, 7, 3]];
 
-/// Keeps the largest face-connected component of `cells` (most cells; of equals the one with the lowest
-/// cell), and the points that it uses, in increasing order of their numbers in `cells`. `position` gives a
-/// point by that number.
+/// Keeps the face-connected component of `cells` with the most cells (of equals the one with the lowest
+/// cell). Its points follow in increasing order of their numbers in `cells`. `position` gives a point by that
+/// number.
 pub(crate) fn largest_component(
     kind: CellKind,
     cells: &[u32],
@@ -87,8 +87,8 @@ pub(crate) fn faces_between_labels(mesh: &Mesh) -> Patches {
     found
 }
 
-/// Whether each cell is in a component with at least the part `smallest` of the cells of the largest one, and
-/// how many components are smaller.
+/// Returns true for each cell of a component with at least the part `smallest` of the cells of the largest
+/// one. Also counts the smaller components.
 pub(crate) fn in_large_components(kind: CellKind, cells: &[u32], smallest: f64) -> (Vec<bool>, usize) {
     let components = Components::new(kind, cells, &sorted_faces(kind, cells));
     let kept = components.large(smallest);
@@ -121,8 +121,9 @@ fn local_faces(kind: CellKind) -> &'static [&'static [usize]] {
     if kind == CellKind::Hex { &HEX_FACES } else { &TET_FACES }
 }
 
-/// One number per face of each cell, sorted so that the faces shared by cells follow each other: the three
-/// smallest nodes (in a lattice they identify a quad too) and below them cell × faces + local face.
+/// One number per face of each cell, sorted so that the faces shared by cells follow each other. Its high
+/// bits are the three smallest nodes (in a lattice they identify a quad too), its low bits cell × faces +
+/// local face.
 fn sorted_faces(kind: CellKind, cells: &[u32]) -> Vec<u128> {
     let local = local_faces(kind);
     let n = kind.node_count();
@@ -173,8 +174,8 @@ impl Components {
         Self { root, count }
     }
 
-    /// Whether each root is that of the component with the most cells (the lowest of equals), or of one with
-    /// at least the part `smallest` of them.
+    /// Returns true for each root of a large component. This is the component with the most cells (the lowest
+    /// of equals), or one with at least the part `smallest` of its cells.
     fn large(&self, smallest: f64) -> Vec<bool> {
         let mut size = vec![0_u32; self.root.len()];
         for &root in &self.root {
@@ -196,7 +197,7 @@ fn find(root: &mut [u32], mut cell: u32) -> u32 {
     cell
 }
 
-/// Boundary edges of the kept cells with other than two boundary faces.
+/// Boundary edges of the kept cells with a number of boundary faces other than two.
 fn non_manifold_edges(kind: CellKind, cells: &[u32], faces: &[u128], kept: impl Fn(usize) -> bool) -> usize {
     let local = local_faces(kind);
     let n = kind.node_count();

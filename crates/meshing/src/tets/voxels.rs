@@ -1,7 +1,7 @@
-//! Cubes in the body of a field, on a regular grid, the largest face-connected part: every cube with its
-//! centre inside, or every cube that the body fills by more than a small fraction, with this fraction.
-//! Immersed cubes are weighted by their fractions and carry the surface of the body (de Visser and Comas
-//! 2008).
+//! Cubes in the body of a field, on a regular grid; only the largest face-connected part is kept. Either
+//! every cube with its centre inside counts, or every cube that the body fills by more than a small fraction.
+//! The second kind has this fraction as data. Immersed cubes are weighted by their fractions and carry the
+//! surface of the body (de Visser and Comas 2008).
 
 use pliant_geometry::{CellKind, DataArray, Vector3};
 use rayon::prelude::*;
@@ -43,7 +43,7 @@ impl Voxels {
         Ok(mesh)
     }
 
-    /// The cubes of the same grid that the body fills by more than 2 %, with the fraction as cell data
+    /// Returns the cubes of the same grid that the body fills by more than 2 %. The fraction is cell data
     /// [`Self::FRACTION`], from 512 samples in each cube near the surface.
     pub fn immersed(&self, field: &(impl ImplicitField + ?Sized)) -> Result<FieldMesh, MeshingError> {
         let (mut made, fractions) =
@@ -54,7 +54,8 @@ impl Voxels {
         Ok(made)
     }
 
-    /// The cubes with more than `least` of a measure at their centres, and its values.
+    /// Makes the cubes with more than `least` of a measure at their centres. Also returns the values of the
+    /// measure.
     fn fill(
         &self,
         field: &(impl ImplicitField + ?Sized),
@@ -115,7 +116,7 @@ fn finite(field: &(impl ImplicitField + ?Sized), point: &Vector3) -> Result<f64,
     if value.is_finite() { Ok(value) } else { Err(MeshingError::FieldNotFinite { value, point: *point }) }
 }
 
-/// Cells that cover a length; a millionth of a cell too many is no cell.
+/// Number of cells that cover a length; an excess of a millionth of a cell adds none.
 fn count_along(length: f64, edge: f64) -> usize {
     ((length / edge - 1e-6).ceil() as usize).max(1)
 }

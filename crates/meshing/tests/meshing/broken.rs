@@ -9,7 +9,8 @@ use pliant_geometry::{Mesh, Vector3};
 use pliant_meshing::{Closing, Enclosed, TriangleMesh};
 use pliant_testing::Random;
 
-/// All that is made of surfaces, with cells of an eighth of the box. Returns whether there was a body.
+/// Makes everything that surfaces allow, with cells of an eighth of the box. Returns true if there was a
+/// body.
 fn fill(mesh: &Mesh) -> bool {
     let size = mesh.bounds().map_or(0.0, |(low, high)| (high - low).norm());
     if let Ok((surface, _)) = TriangleMesh::from_mesh(mesh) {

@@ -34,8 +34,8 @@ fn ball_volume(radius: f64) -> f64 {
     4.0 / 3.0 * std::f64::consts::PI * radius.powi(3)
 }
 
-/// Distances of a ball are R − r, up to the sagitta of its triangles and the curvature between points of the
-/// grid (h²/4R = 0.01 mm for h = 1 mm).
+/// Distances of a ball are R − r, up to two errors: the sagitta of its triangles, and the curvature between
+/// grid points. The second is h²/4R = 0.01 mm for h = 1 mm.
 #[test]
 fn the_field_of_a_ball_is_the_distance_to_it() {
     let body = enclosed(&ball(0.03, 0.01));
@@ -162,7 +162,7 @@ fn a_flat_surface_encloses_nothing() {
     ));
 }
 
-/// As tets: the volume of the surface within a part in a thousand, and large steps.
+/// Tets have the volume of the surface within a part in a thousand, and large steps.
 #[test]
 fn a_closed_surface_becomes_tets_of_its_volume() {
     let body = enclosed(&ball(0.03, 0.0));

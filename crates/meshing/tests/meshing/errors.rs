@@ -1,4 +1,4 @@
-//! Every request that cannot be met says why.
+//! Every request that cannot be met gives a reason.
 
 use pliant_geometry::Vector3;
 use pliant_meshing::*;

@@ -25,8 +25,8 @@ fn meshed(anatomy: &Anatomy<'_>, edge: f64, origin: Vector3) -> OrganMesh {
     request.mesh(anatomy, &|_| {}).expect("the organ is meshed")
 }
 
-/// T4: every inner face has two cells, volumes are positive, every point is used, no boundary edge has more
-/// than two faces, no edge is longer than 1.6 times the local request; the report matches the mesh.
+/// T4: every inner face has two cells, volumes are positive and every point is used. No boundary edge has
+/// more than two faces, and no edge is longer than 1.6 times the local request. The report matches the mesh.
 pub fn check_sound(made: &OrganMesh) -> Vec<Vec<u32>> {
     let faces = conforming_boundary(&made.mesh);
     assert!(tet_volumes(&made.mesh).iter().all(|&volume| volume > 0.0));
@@ -72,7 +72,7 @@ fn sphere_at(lattices: usize) {
     }
 }
 
-/// Where labels meet in lines and corners, no flat tets are left between them.
+/// No flat tets are left at lines and corners where labels meet.
 #[test]
 fn many_labels_keep_three_quarters_of_the_ideal_step() {
     let ball = anatomy(&organs::parted_ball(0.05), &[1, 2, 3, 4, 5]);
@@ -81,7 +81,7 @@ fn many_labels_keep_three_quarters_of_the_ideal_step() {
     assert!(made.report.acoustic_part >= 0.75, "{}", made.report);
 }
 
-/// A hundred labels side by side, four cells wide: each has its cells in its place, with about its volume.
+/// A hundred labels side by side, four cells wide. Each has its cells in its place, with about its volume.
 #[test]
 #[ignore = "slow: a minute"]
 fn a_hundred_labels_are_as_many_materials() {
@@ -198,7 +198,7 @@ fn the_thread_count_never_changes_a_bit() {
     }
 }
 
-/// The same body in an image stored mirrored and turned gives the same mesh.
+/// A body in an image stored mirrored and turned gives the same mesh.
 #[test]
 fn storage_order_and_handedness_do_not_matter() {
     let image = organs::ball(0.03);
@@ -341,8 +341,8 @@ fn a_thin_wall_is_not_torn() {
     }
 }
 
-/// Every kind of mesh tells whether its boundary is that of the body: large cubes do not enclose the cavity
-/// of a thin wall, fine triangles do.
+/// Every kind of mesh reports whether its boundary has the topology of the body. Large cubes do not enclose
+/// the cavity of a thin wall, fine triangles do.
 #[test]
 fn boundaries_of_cubes_and_triangles_are_checked() {
     let wall = Hollow { outer: 0.03, wall: 0.003 };
@@ -356,7 +356,7 @@ fn boundaries_of_cubes_and_triangles_are_checked() {
     let surface = TriangleMesh::of_field(&wall, 0.001, usize::MAX).unwrap().to_mesh();
     let check = SurfaceCheck::of(&surface);
     assert_eq!((check.euler_number, check.self_intersections, check.doubt()), (4, 0, None));
-    // A piece of it that is moved passes through the rest.
+    // A moved piece of the surface passes through the rest.
     let mut moved = surface.clone();
     moved.points.iter_mut().filter(|x| x.norm() > 0.0285).for_each(|x| x.x += 0.004);
     let check = SurfaceCheck::of(&moved);

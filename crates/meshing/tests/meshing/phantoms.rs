@@ -8,7 +8,7 @@ use pliant_testing::mesh_checks::*;
 
 /// The volume that the definition gives for the liver [m³].
 const LIVER: f64 = 774e-6;
-/// The same for the brain, printed as 1.30 l and as 1299 ml [m³].
+/// The volume that the definition gives for the brain, printed as 1.30 l and as 1299 ml [m³].
 const BRAIN: f64 = 1.299e-3;
 
 fn organ(organ: Organ) -> Phantom {
@@ -53,8 +53,8 @@ fn the_boxes_enclose_the_organs_tightly() {
     }
 }
 
-/// The box of the samples inside a body, on a grid that reaches 10 mm beyond the box that the body claims,
-/// and the step of the grid.
+/// Returns the box of the samples inside a body and the step of their grid. The grid reaches 10 mm beyond the
+/// box that the body claims.
 fn sampled_box(body: &Phantom) -> (Vector3, Vector3, Vector3) {
     const SAMPLES: usize = 80;
     let (low, high) = body.bounds();

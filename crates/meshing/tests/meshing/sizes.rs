@@ -28,8 +28,8 @@ fn skin(mesh: &Mesh) -> TriangleMesh {
     TriangleMesh::from_mesh(&skin).expect("a surface").0
 }
 
-/// The field of cells of 8 mm loses most of the spike, and the mesh follows the field. The report used to
-/// give its distance from the field.
+/// The field of cells of 8 mm loses most of the spike, and the mesh follows the field. The report must give
+/// the distance from the triangles.
 #[test]
 fn tets_of_a_surface_are_measured_to_its_triangles() {
     let edge = 0.008;
@@ -41,7 +41,7 @@ fn tets_of_a_surface_are_measured_to_its_triangles() {
     let given = TriangleMesh::from_mesh(&given).expect("a surface").0;
     let truth = Hausdorff::between(&skin(&made.mesh), &given, 2e-4);
     assert_eq!(deviation.to, MeasuredTo::Triangles);
-    // Samples are a quarter of an edge apart; the tip is one of them.
+    // Samples are a quarter of an edge apart; the tip is a sample.
     assert!(
         (deviation.largest_from_body / truth.largest_backward - 1.0).abs() < 0.01,
         "{deviation:?} {truth:?}"
@@ -61,7 +61,7 @@ fn tets_of_a_surface_are_measured_to_its_triangles() {
     );
 }
 
-/// A block of 40 mm of label 1 with a plate of label 2, 4 mm thick, and a ball of label 3 of 3 mm in it.
+/// A block of 40 mm of label 1. It contains a plate of label 2, 4 mm thick, and a ball of label 3 of 3 mm.
 fn block_with_plate() -> LabelImage {
     let grid = Grid::along_axes([50, 50, 50], Vector3::zeros(), [1e-3; 3]).expect("a grid");
     let label = |at: usize| {
@@ -127,7 +127,7 @@ fn labels_that_are_off_are_told_and_better_where_they_are_protected() {
     assert!(off(&fine, 2) < 0.02 && off(&fine, 3) < 0.05, "{}", fine.report);
     assert!(between(&better).is_some_and(|better| better < between(&found).unwrap_or(f64::INFINITY)));
     assert!(fine.report.acoustic_part > 0.6, "{}", fine.report);
-    // Only on request: cells of 2 mm everywhere would be 64 times as many as those of 8 mm.
+    // Only on request: cells of 2 mm everywhere would be 64 times as many as cells of 8 mm.
     assert!(fine.report.tets < 40 * coarse.report.tets);
     let error =
         OrganTets::new(edge).protecting(&[(4, None)]).mesh(&block, &|_| {}).expect_err("no such label");
@@ -179,7 +179,7 @@ fn a_distance_is_held_or_the_best_so_far_is_told() {
         made.report
     );
     assert!(truth.largest() < 1.53e-3, "{truth:?}");
-    // A warning names the spike, which costs most of the step, and there is no other.
+    // A warning names the spike, which costs most of the step. It is the only warning.
     let doubts = made.report.doubts();
     assert!(doubts.len() == 1 && doubts[0].contains("make the step"), "{doubts:?}");
     // Few cells are allowed.
@@ -187,7 +187,8 @@ fn a_distance_is_held_or_the_best_so_far_is_told() {
     assert!(made.report.tets <= 2000 && made.report.doubts()[0].contains("not reached"), "{}", made.report);
 }
 
-/// Where cubes of two sizes meet, edges along large cubes with small ones at both ends are halved.
+/// At the border between cubes of two sizes, edges along large cubes with small cubes at both ends are
+/// halved.
 #[test]
 fn no_edge_is_longer_than_allowed_where_sizes_change() {
     let ball = |x: f64, radius: f64| Ellipsoid::sphere(Vector3::new(x, 0.0, 0.0), radius);

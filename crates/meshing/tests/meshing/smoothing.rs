@@ -48,7 +48,7 @@ fn the_surface_of_the_livers_labels_is_close_to_the_liver() {
     assert!(made.is_closed());
 }
 
-/// What `SURFACE_SMOOTHING` and `SURFACE_PAIRS` were chosen from.
+/// Prints the table from which `SURFACE_SMOOTHING` and `SURFACE_PAIRS` were chosen.
 #[test]
 #[ignore = "takes minutes; prints a table"]
 fn what_was_tried() {

@@ -25,7 +25,8 @@ pub(super) struct Rows {
     /// Bytes of the whole rows in it.
     length: u64,
     crc: Hasher,
-    /// What an interrupted run had written beyond them. It stays until this run writes something else there.
+    /// Rows that an interrupted run had written after its checkpoint. They stay until this run writes other
+    /// rows there.
     beyond: Vec<u8>,
     samples: Samples,
     row: Vec<f64>,
@@ -45,11 +46,11 @@ pub fn sampled_columns(world: &World) -> Vec<Column> {
     Samples::new(world, &world.scene.sampled()).columns
 }
 
-/// The samples of a table at an instant: energies of several participants together, then those of each
-/// participant.
+/// The samples of a table at an instant: the energies of several participants together, then the samples of
+/// each participant.
 pub(crate) struct Samples {
     columns: Vec<Column>,
-    /// Whether energies of all participants together come first.
+    /// True if the energies of all participants together come first.
     total: bool,
     parts: Vec<Columns>,
 }
@@ -97,16 +98,17 @@ impl Column {
     }
 }
 
-/// Those of one participant.
+/// The columns of one participant.
 struct Columns {
     reactions: Vec<usize>,
     /// Constraints of volume.
     volumes: Vec<usize>,
-    /// Contacts whose forces are columns: all but those of a body with itself, whose forces have no sum.
+    /// Contacts whose forces are columns: all contacts except self-contact, whose forces have no sum.
     contacts: Vec<usize>,
     /// Contacts of each tool and obstacle that has several.
     things: Vec<Vec<usize>>,
-    /// The point [m] about which moments of reactions are taken, and what each of them prescribes.
+    /// The point [m] about which moments of reactions are taken, and the nodes and components of each
+    /// constraint.
     moments: Option<([f64; 3], Vec<Held>)>,
     energy: bool,
     probes: Vec<Probe>,
@@ -214,7 +216,7 @@ impl Columns {
         }
         if !self.contacts.is_empty() {
             let forces = frame.now.contact_forces();
-            // Before the first evaluation there are none.
+            // No forces exist before the first evaluation.
             let force = |at: &usize| forces.get(*at).copied().unwrap_or_default();
             self.contacts.iter().for_each(|at| row.extend(force(at)));
             self.things.iter().for_each(|all| row.extend(all.iter().map(force).fold([0.0; 3], add)));
@@ -271,7 +273,7 @@ fn several_contacts(built: &Built) -> Vec<(&str, Vec<usize>)> {
 /// The nodes of a constraint, with the components that are its own: translations, of shells then rotations.
 struct Held(Vec<(u32, [bool; 6])>);
 
-/// Those of some constraints.
+/// Returns the held nodes and components of some constraints.
 fn held(built: &Built, constraints: &[usize]) -> Vec<Held> {
     let model = &built.model;
     // Contradictions were reported before.
@@ -331,7 +333,7 @@ impl Rows {
         self.write(header)
     }
 
-    /// Goes on after the rows that an interrupted run had written at its checkpoint.
+    /// Continues after the rows that an interrupted run had written at its checkpoint.
     pub(super) fn take_up(&mut self, bytes: u64, crc: u32) -> Result<(), OutputError> {
         let mut content = Vec::new();
         let opened = reopen(&self.path).and_then(|mut file| {
@@ -354,8 +356,8 @@ impl Rows {
         OutputError::new(&self.path, error)
     }
 
-    /// Writes a row in one go; of one that does not fit on the disk nothing stays. A row that stands there
-    /// already is passed over; any other is cut off with all after it.
+    /// Writes a row in one go; a row that does not fit on the disk leaves no part. A row that is there
+    /// already is skipped; any other row is cut off with all later ones.
     fn write(&mut self, mut row: String) -> Result<(), OutputError> {
         row.push('\n');
         if self.beyond.starts_with(row.as_bytes()) {
@@ -386,7 +388,7 @@ impl Rows {
     }
 }
 
-/// Where a point of a surface on a shell is [m].
+/// Returns the place [m] of a point of a surface on a shell.
 fn carried(frame: &Frame<'_>, point: &Carried) -> Vector3 {
     let part = frame.built().implicit.as_ref();
     let found =
@@ -394,7 +396,7 @@ fn carried(frame: &Frame<'_>, point: &Carried) -> Vector3 {
     found.unwrap_or_else(|| Vector3::repeat(f64::NAN))
 }
 
-/// Whether a table begins with these bytes; the reason if not.
+/// Checks that a table begins with these bytes; returns the reason if not.
 pub(super) fn verify(path: &Path, bytes: u64, crc: u32) -> Result<(), String> {
     let content = fs::read(path).map_err(|error| error.to_string())?;
     match content.get(..bytes as usize) {

@@ -19,12 +19,12 @@ pub(crate) struct FieldMesh {
     parts: Vec<(usize, ParticipantMesh)>,
     /// Names of bodies, obstacles and tools by their number.
     names: BTreeMap<i32, String>,
-    /// Those of several together.
+    /// The mesh of several participants together.
     merged: Option<Mesh>,
 }
 
 impl FieldMesh {
-    /// Of what a series shows.
+    /// Makes the mesh of the bodies of a series.
     pub fn new(world: &World, table: &VtuTable) -> Self {
         let on = table.on.as_deref();
         let shown = world.participants.iter().enumerate().filter(|(_, part)| part.shows(on));
@@ -60,7 +60,7 @@ impl FieldMesh {
         self.merged.as_ref().unwrap_or_else(|| &self.parts[0].1.mesh)
     }
 
-    /// The participant of a point, what its mesh is of, and its number there.
+    /// Returns the participant of a point, the participant's mesh, and the point's number there.
     fn part_of(&self, point: u32) -> Option<(usize, &ParticipantMesh, usize)> {
         let mut point = point as usize;
         for (index, own) in &self.parts {
@@ -87,7 +87,7 @@ impl FieldMesh {
         Some((index, owners[point] as usize))
     }
 
-    /// The way of a point of a rigid thing per growth of it; none of a point of a body.
+    /// Displacement of a point of a rigid thing per unit of its growth; zero for a point of a body.
     pub(crate) fn outward_of(&self, point: u32) -> Vector3 {
         let part = self.part_of(point).map(|(_, own, point)| (&own.content, point));
         match part {
@@ -110,7 +110,7 @@ impl FieldMesh {
     }
 }
 
-/// That of the solids or the shells of one participant.
+/// The mesh of the solids or the shells of one participant.
 struct ParticipantMesh {
     mesh: Mesh,
     /// Bodies of the participants before it.
@@ -120,7 +120,7 @@ struct ParticipantMesh {
     content: Content,
 }
 
-/// What the points and cells of the mesh are in the model.
+/// The points and cells of the mesh in the model.
 enum Content {
     /// A carried surface.
     Surface(usize),
@@ -130,13 +130,13 @@ enum Content {
     Shells { nodes: Vec<u32>, facets: Vec<u32>, fields: Box<fields::OfShells> },
     /// The curved surface of shells.
     Curved(Box<super::curved::Curved>),
-    /// Obstacles and tools: the thing of each point, and the way of the point per growth of it.
+    /// Obstacles and tools: the thing of each point, and the displacement of the point per unit of growth.
     Things { owners: Vec<u32>, outward: Vec<Vector3> },
 }
 
 impl ParticipantMesh {
-    /// Of a body or surface by name, or of all bodies, solids before shells; with `curved`, of the curved
-    /// surface of shells.
+    /// Makes the mesh of a body or surface by name, or of all bodies, solids before shells. With `curved`,
+    /// makes the curved surface of shells.
     fn all(built: &Built, on: Option<&str>, fields: &[FieldName], at: At, curved: Option<u32>) -> Vec<Self> {
         let own = |(mesh, content), fields| Self::new(built, on, mesh, content, fields, at);
         let surface = built.model.surfaces.iter().position(|surface| Some(surface.name.as_str()) == on);
@@ -166,7 +166,7 @@ impl ParticipantMesh {
         all
     }
 
-    /// Of the obstacles and tools that its bodies touch, where they are at the start; `None` without any.
+    /// Makes the mesh of the obstacles and tools that its bodies touch, at the start; `None` without any.
     fn of_things(built: &Built, fields: &[FieldName]) -> Option<Self> {
         let contacts = built.contacts.as_ref()?;
         let bounds = built.bodies.iter().filter_map(|body| body.mesh.bounds());
@@ -280,8 +280,8 @@ fn moved_things(frame: &Frame<'_>, points: &[Vector3], owners: &[u32], outward: 
     points.iter().zip(owners).zip(outward).flat_map(moved).collect()
 }
 
-/// Fields on a carried surface; those of cells as means at the nodes, which points outside of all cells do
-/// not extrapolate.
+/// Fills the fields of a carried surface. Fields of cells are means at the nodes; points outside of all cells
+/// do not extrapolate them.
 fn fill_surface(mesh: &mut Mesh, frame: &Frame<'_>, wanted: &[FieldName], surface: usize) {
     let model = &frame.built().model;
     let mapping = &model.surfaces[surface].mapping;

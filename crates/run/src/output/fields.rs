@@ -23,11 +23,11 @@ pub(super) struct OfNodes<'f, 'p> {
     loads: Vec<[f64; 3]>,
     /// Weights [N]; empty where they are not wanted.
     weights: Vec<[f64; 3]>,
-    /// Whether each node is free, held, moved or under a plate; empty where that is not wanted.
+    /// State of each node: free, held, moved or under a plate; empty where the field is not wanted.
     held: Vec<f64>,
 }
 
-/// What the field `constraint` is of a node that is held, of one that is moved, and of one under a plate.
+/// Values of the field `constraint` at a node that is held, that is moved, and that is under a plate.
 const HELD: f64 = 1.0;
 const MOVED: f64 = 2.0;
 const PLATE: f64 = 3.0;

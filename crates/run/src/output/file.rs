@@ -39,14 +39,14 @@ pub(crate) fn create(path: &Path) -> io::Result<File> {
     }
 }
 
-/// Opens a file that is there, to read it and write on.
+/// Opens an existing file to read it and append to it.
 pub(crate) fn reopen(path: &Path) -> io::Result<File> {
     check_own(path)?;
     let file = OpenOptions::new().read(true).write(true).open(path)?;
     if is_at(&file, path)? { Ok(file) } else { Err(link(path)) }
 }
 
-/// Whether a file lies at a path itself, and not only where a link there leads to.
+/// True if a path leads to the open file itself, and not through a link.
 #[cfg(unix)]
 pub(crate) fn is_at(file: &File, path: &Path) -> io::Result<bool> {
     use std::os::unix::fs::MetadataExt;
@@ -58,7 +58,7 @@ pub(crate) fn is_at(file: &File, path: &Path) -> io::Result<bool> {
     }
 }
 
-/// Whether a file lies at a path itself; elsewhere than on Unix an open file keeps its name.
+/// True if a path leads to the open file itself; except on Unix an open file keeps its name.
 #[cfg(not(unix))]
 pub(crate) fn is_at(_: &File, _: &Path) -> io::Result<bool> {
     Ok(true)
@@ -79,7 +79,7 @@ pub(crate) fn replace(path: &Path, write: impl FnOnce(&mut File) -> io::Result<(
     let mut file = create(&temporary)?;
     let written = write(&mut file).and_then(|()| fs::rename(&temporary, path));
     if written.is_err() {
-        // What is half written is not left behind.
+        // A half-written file is not left behind.
         let _ = fs::remove_file(&temporary);
     }
     written

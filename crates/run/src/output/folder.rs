@@ -23,7 +23,7 @@ pub(crate) const PICTURE: &str = "picture.png";
 /// Locked by the run that writes to the folder; holds the number of its process.
 const LOCK: &str = ".pliant-lock";
 
-/// Where a run writes. As long as it or a clone of it lives, no other run gets the folder.
+/// The output folder of a run. As long as this value or a clone lives, no other run gets the folder.
 #[derive(Clone, Debug)]
 pub struct OutputFolder {
     path: PathBuf,
@@ -81,11 +81,11 @@ impl OutputFolder {
         Ok(Self { path, _lock: Arc::new(lock) })
     }
 
-    /// Opens the folder of an interrupted run to go on with it. Nothing of the run changes yet.
+    /// Opens the folder of an interrupted run to continue the run. The files do not change yet.
     ///
     /// # Errors
-    /// If it does not hold the outputs as they were at the checkpoint, if nothing is left to run, or if the
-    /// folder is held by another run or can't be written to.
+    /// If the folder does not hold the outputs as they were at the checkpoint, or nothing is left to run.
+    /// Also if another run holds the folder or it can't be written to.
     pub fn reopen(path: PathBuf, scene: &Scene, checkpoint: &Checkpoint) -> Result<Self, ResumeError> {
         let refused = |path: &Path, reason| ResumeError::OtherOutputs { path: path.to_owned(), reason };
         if !path.is_dir() {
@@ -111,8 +111,8 @@ impl OutputFolder {
         Ok(Self { path, _lock: Arc::new(lock) })
     }
 
-    /// Before a resumed run continues, removes the files of a finished run and the unfinished files of a
-    /// killed one: pages are there only of a run that has ended.
+    /// Removes the files of a finished run and the unfinished files of a killed one, before a resumed run
+    /// continues. Only a run that has ended leaves pages.
     pub(crate) fn go_on(&self, scene: &Scene) -> Result<(), OutputError> {
         let removed = || -> io::Result<()> {
             remove_pages(&self.path)?;
@@ -122,7 +122,7 @@ impl OutputFolder {
         removed().map_err(|error| OutputError::new(&self.path, error))
     }
 
-    /// Removes a folder with the outputs of an earlier run of a scene; what is not of it stays.
+    /// Removes a folder with the outputs of an earlier run of a scene; other files stay.
     pub(crate) fn clear(path: &Path, scene: &Scene) -> Result<(), OutputError> {
         remove_earlier(path, scene)?;
         let cleared = || -> io::Result<()> {
@@ -183,7 +183,8 @@ impl Lock {
         }
     }
 
-    /// Leaves the number of this process to those who come later. A lock without it holds as well.
+    /// Writes the number of this process into the lock, for later processes. A lock without a number holds as
+    /// well.
     fn sign(&self) {
         let mut file = &self.file;
         let _ = self.file.set_len(0).and_then(|()| write!(file, "{}", std::process::id()));
@@ -243,7 +244,7 @@ fn check_links(folder: &Path, scene: &Scene) -> Result<(), OutputError> {
     Ok(())
 }
 
-/// Whether all that a run writes at its end is there.
+/// True if the folder holds everything that a run writes at its end.
 fn has_ended(folder: &Path, scene: &Scene, time: f64) -> bool {
     let pages = [SUMMARY, PLOT].iter().all(|page| folder.join(page).is_file());
     let outputs = || {
@@ -296,7 +297,7 @@ fn remove_pages(folder: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Removes `000000.vtu`, …, or those of another ending that a killed run left unfinished.
+/// Removes `000000.vtu`, …, or the files with another ending that a killed run left unfinished.
 fn remove_frames(folder: &Path, ending: &str) -> io::Result<()> {
     if !folder.is_dir() {
         return Ok(());

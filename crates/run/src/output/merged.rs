@@ -42,7 +42,7 @@ pub(super) fn merged(numbered: &[(&Mesh, usize)]) -> Mesh {
     all
 }
 
-/// Data one after another, of so many items each.
+/// Joins data one after another; each part has the given number of items.
 fn joined<'a>(
     parts: impl Iterator<Item = (&'a BTreeMap<String, DataArray>, usize)> + Clone,
 ) -> BTreeMap<String, DataArray> {

@@ -52,9 +52,9 @@ pub(crate) use summary::{bodies, interrupted, markdown, output_failure, summaris
 pub struct OutputError {
     /// The file or folder.
     pub path: PathBuf,
-    /// What the system says.
+    /// Message of the system.
     pub reason: String,
-    /// What to try.
+    /// Remedy for the user.
     pub remedy: &'static str,
 }
 
@@ -98,7 +98,7 @@ impl<'a> Frame<'a> {
 /// Fields of cells of solids, found once for all outputs that show the instant.
 struct Recovered<'a> {
     now: Box<dyn CellsNow + 'a>,
-    /// Those of each solid that were asked for.
+    /// Fields of each solid that were asked for.
     solids: Vec<RefCell<Vec<(FieldName, CellNumbers)>>>,
 }
 
@@ -107,13 +107,12 @@ impl<'a> Recovered<'a> {
         Self { now, solids: vec![RefCell::default(); solids] }
     }
 
-    /// Those of one cell of a solid.
+    /// Returns the fields of one cell of a solid.
     fn at(&self, solid: usize, cell: usize, step: bool) -> CellFields {
         self.now.at(solid, cell, step)
     }
 
-    /// Some of all cells of a solid. Those that nobody has asked for before take one pass over the cells
-    /// together.
+    /// Returns some fields of all cells of a solid. New fields take one pass over the cells together.
     fn of(&self, solid: usize, wanted: &[FieldName]) -> Vec<CellNumbers> {
         let mut known = self.solids[solid].borrow_mut();
         let mut missing: Vec<FieldName> = Vec::new();
@@ -161,7 +160,7 @@ impl CellNumbers {
     }
 }
 
-/// All participants of a simulation of a world as outputs read them.
+/// Returns all participants of a simulation of a world as outputs read them.
 pub(crate) fn frames<'a>(world: &'a World, simulation: &'a Simulation) -> Vec<Frame<'a>> {
     world.participants.iter().zip(simulation.instants()).map(|(part, now)| Frame::new(part, now)).collect()
 }
@@ -176,14 +175,14 @@ pub(crate) trait Output: Send {
     /// Writes down an instant of all participants.
     fn see(&mut self, frames: &[Frame<'_>]) -> Result<(), OutputError>;
 
-    /// What is written so far.
+    /// Returns what the output has written so far.
     fn written(&self) -> Written;
 
-    /// Removes what an interrupted run had written beyond the end of the one that went on with it.
+    /// Removes the later output of an interrupted run, after the end of the run that continued it.
     fn finish(&mut self) -> Result<(), OutputError>;
 }
 
-/// What an output has written, for a run that goes on with it.
+/// Progress of an output, for a run that continues it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) enum Written {
     /// Whole rows of a table.

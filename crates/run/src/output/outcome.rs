@@ -28,13 +28,13 @@ pub(crate) struct Outcome {
     pub wall_seconds: f64,
     /// Energies of all participants together.
     pub energies: Energies,
-    /// Of each participant, in the order of the world.
+    /// Results of the participants, in the order of the world.
     pub parts: Vec<PartOutcome>,
     /// The ties between participants.
     pub ties: Vec<TieSummary>,
     /// The contacts between participants.
     pub guests: Vec<CoupledSurfaceSummary>,
-    /// Why it ended before the time of the scene was over, without a failure.
+    /// Reason why the run ended before the time of the scene was over, without a failure.
     pub ended: Option<String>,
     pub history: History,
     pub files: Vec<PathBuf>,
@@ -46,7 +46,7 @@ pub(crate) struct Outcome {
 }
 
 impl Outcome {
-    /// Of a run whose steppers could not be made.
+    /// Makes the outcome of a run whose steppers could not be made.
     pub(crate) fn not_begun(failure: Failure, world: &World) -> Self {
         let part = |part: &Part| PartOutcome {
             reactions: vec![[0.0; 3]; part.built.model.constraints.len()],
@@ -80,16 +80,16 @@ pub(crate) struct PartOutcome {
     /// Hourglass energy over the internal one.
     pub hourglass_share: f64,
     pub watched: Watched,
-    /// The critical time step as it was seen; `None` of a run without inertia.
+    /// The monitored critical time step; `None` for a run without inertia.
     pub stability: Option<Stability>,
-    /// How good its equilibria are, if it found some by dynamic relaxation.
+    /// Quality of the equilibria, if the participant found some by dynamic relaxation.
     pub equilibria: Option<Equilibria>,
     /// Cost of its equations, if it solved some.
     pub effort: Option<Effort>,
     /// Residuals of its last iterations, as a table.
     pub convergence: Option<String>,
     pub reactions: Vec<[f64; 3]>,
-    /// What constraints of volume enclose.
+    /// State of what each volume constraint encloses.
     pub enclosed: Vec<Option<Enclosed>>,
     /// The tools and the constraints that were held back.
     pub held_back: Vec<HeldBack>,
@@ -100,11 +100,11 @@ pub(crate) struct PartOutcome {
 pub(crate) struct HeldBack {
     /// The tool or the constraint.
     pub name: String,
-    /// Whether it is a volume.
+    /// True for a volume.
     pub is_volume: bool,
     /// Its longest lag [m, of a volume m³].
     pub lag: f64,
-    /// When that was [s].
+    /// Time of the longest lag [s].
     pub time: f64,
 }
 
@@ -231,7 +231,7 @@ pub(crate) struct Watched {
     pub worst_balance: f64,
     /// The largest hourglass energy over the internal one, and its time [s].
     pub worst_hourglass: (f64, f64),
-    /// How far shells were strained.
+    /// Largest strains of shells.
     pub strains: ShellStrains,
     /// Intersections of explicit bodies.
     pub intersections: Intersections,
@@ -243,7 +243,7 @@ pub(crate) struct Watched {
 /// last one.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Intersections {
-    /// All of them, counted in each state.
+    /// Number of intersections, counted in each state.
     #[serde(deserialize_with = "count::read")]
     pub count: u64,
     /// States that were searched.
@@ -282,7 +282,7 @@ impl Intersections {
         self.states += u64::from(self.count > before);
     }
 
-    /// Together with those of another participant.
+    /// Joins this result with another participant's.
     pub(crate) fn with(self, other: Self) -> Self {
         let [count, searched, states] =
             [self.count + other.count, self.searched + other.searched, self.states + other.states];
@@ -290,7 +290,7 @@ impl Intersections {
         Self { count, searched, states, ..deepest }
     }
 
-    /// What a user should know of them; `None` without any.
+    /// Returns the warning to the user; `None` without intersections.
     pub(crate) fn doubt(&self) -> Option<String> {
         let Self { count, searched, states, deepest, time, at, contact } = self;
         (*count > 0).then(|| {

@@ -1,6 +1,6 @@
-//! The outputs of a run with their schedules. Those of whole meshes, which take longer than steps, work on a
-//! thread of their own: it gets snapshots in their order, a few at a time, and finds the forces of each again
-//! in a simulation of its own, with the same bits.
+//! The outputs of a run with their schedules. Outputs of whole meshes take longer than steps and work on a
+//! thread of their own. That thread gets snapshots in their order, a few at a time. It computes the forces of
+//! each again in its own simulation, with the same bits.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -17,11 +17,11 @@ use super::{Output, OutputError, Written, csv, frames, output_failure, vtu};
 /// Snapshots that wait for their outputs; a run that is faster waits, too.
 const WAITING: usize = 2;
 
-/// All outputs of a run, in the order of the scene.
+/// The outputs of a run, in the order of the scene.
 pub(crate) struct Outputs<'scope> {
     world: &'scope World,
     schedules: Vec<Schedule>,
-    /// Those that work within the run, by their place in the scene.
+    /// Outputs that work within the run, by their place in the scene.
     near: Vec<Own>,
     far: Option<Far<'scope>>,
 }
@@ -39,15 +39,15 @@ struct Far<'scope> {
 enum Task {
     /// Shows a state to the outputs of these places.
     See(Box<State>, Vec<usize>),
-    /// Answers with what is written so far.
+    /// Answers with what the outputs have written so far.
     Written(Sender<Vec<(usize, Written)>>),
     /// Removes what an interrupted run had written beyond the end.
     Finish,
 }
 
 impl<'scope> Outputs<'scope> {
-    /// The outputs of a world. Their files are opened here; all paths go to `files`. Those of a run that goes
-    /// on take up what is `written`. With a thread to spare, some work on it.
+    /// Opens the outputs of a world and their files, and adds all paths to `files`. The outputs of a resumed
+    /// run continue `written`. With a spare thread, some outputs work on it.
     pub fn new(
         world: &'scope World,
         folder: &Path,
@@ -91,12 +91,12 @@ impl<'scope> Outputs<'scope> {
         &self.schedules
     }
 
-    /// Whether any awaits an instant.
+    /// True if any output awaits an instant.
     pub(crate) fn are_due(&self, time: f64, step: f64, last: bool) -> bool {
         self.schedules.iter().any(|schedule| schedule.awaits(time, step, last))
     }
 
-    /// Whether one within the run awaits an instant.
+    /// True if an output within the run awaits an instant.
     pub fn reads(&self, time: f64, step: f64, last: bool) -> bool {
         self.near.iter().any(|(place, _)| self.schedules[*place].awaits(time, step, last))
     }
@@ -142,17 +142,17 @@ impl<'scope> Outputs<'scope> {
         }
     }
 
-    /// Removes rows and frames beyond those that were taken up.
+    /// Removes rows and frames after those that a resumed run continues.
     pub(crate) fn remove_later(&mut self) -> Result<(), OutputError> {
         self.near.iter_mut().try_for_each(|(_, output)| output.finish())?;
         if let Some(far) = &self.far {
-            // A thread that has failed tells why when it is joined.
+            // The error of a failed thread is reported when the thread is joined.
             let _ = far.tasks.send(Task::Finish);
         }
         Ok(())
     }
 
-    /// What is written so far, for a checkpoint.
+    /// Returns what the outputs have written so far, for a checkpoint.
     pub fn written(&mut self) -> Result<Vec<(Schedule, Written)>, Failure> {
         let mut all: Vec<(usize, Written)> =
             self.near.iter().map(|(place, output)| (*place, output.written())).collect();
@@ -172,7 +172,7 @@ impl<'scope> Outputs<'scope> {
     pub fn end(&mut self) -> Result<(), Failure> {
         let Some(Far { tasks, thread, .. }) = self.far.take() else { return Ok(()) };
         drop(tasks);
-        // Its panic goes on here.
+        // A panic of the thread continues here.
         thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     }
 }
@@ -185,7 +185,7 @@ impl<'scope> Far<'scope> {
     }
 }
 
-/// Does what comes in, until nobody sends any more.
+/// Executes tasks until the sender is gone.
 fn work(world: &World, mut outputs: Vec<Own>, tasks: &Receiver<Task>) -> Result<(), Failure> {
     // Parallel loops stay on this thread, which is all of a pool of its own.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();

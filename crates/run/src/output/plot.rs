@@ -1,5 +1,5 @@
-//! SVG plots: of a run the size of each reaction, the energies, and pressure and volume of what constraints
-//! fill, over time; of a sweep each reaction in all runs.
+//! SVG plots over time. The plot of a run shows the size of each reaction, the energies, and pressure and
+//! volume of what constraints fill. The plot of a sweep shows each reaction in all runs.
 
 use pliant_mechanics::model::Constraint;
 use pliant_scene::World;
@@ -8,7 +8,7 @@ use plotters::prelude::*;
 
 use super::History;
 
-/// Colours that colour-blind eyes tell apart (Okabe and Ito 2008).
+/// Colours that colour-blind eyes can distinguish (Okabe and Ito 2008).
 const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -69,7 +69,7 @@ pub(crate) fn plot(world: &World, history: &History) -> Result<String, String> {
         };
         let energies = [
             energy("external work", |e| e.external),
-            // What viscous laws have dissipated is not known apart from it.
+            // The internal energy includes the dissipation of viscous laws, which is not known separately.
             energy("internal (stored and viscous)", |e| e.internal),
             energy("kinetic", |e| e.kinetic),
             energy("damping", |e| e.damping),
@@ -90,14 +90,14 @@ pub(crate) fn plot(world: &World, history: &History) -> Result<String, String> {
     Ok(with_round_joins(&svg))
 }
 
-/// The same plot with round joins of lines: a mitre would reach beyond the values of a curve that turns
+/// Returns the plot with round joins of lines: a mitre would reach beyond the values of a curve that turns
 /// sharply.
 fn with_round_joins(svg: &str) -> String {
     svg.replace("<polyline fill=\"none\"", "<polyline fill=\"none\" stroke-linejoin=\"round\"")
 }
 
-/// The plot of some runs of a sweep: a panel for each reaction, six at most, and a curve in it for each run
-/// by its title. `None` without any reaction.
+/// Draws some runs of a sweep: a panel for each reaction, six at most, with a curve for each run by its
+/// title. Returns `None` without any reaction.
 pub(crate) fn plot_of_sweep(runs: &[(String, Reactions)]) -> Result<Option<String>, String> {
     let mut names: Vec<&str> = Vec::new();
     for (name, _) in runs.iter().flat_map(|(_, reactions)| reactions) {

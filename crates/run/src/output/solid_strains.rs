@@ -144,9 +144,9 @@ fn compressive_force(fields: &CellFields) -> f64 {
     (-least).max(0.0)
 }
 
-/// The compressive force [N/m] at which each element of a membrane on a solid wrinkles as short as its mean
-/// edge h: E* h/2π, the least of E t³ k²/12 + E* / (2 k) that a wavelength 2π/k of two edges allows without
-/// bending (Biot 1957). `None` of other cells, and of membranes on no solid.
+/// Returns the compressive force [N/m] at which each element of a membrane on a solid wrinkles as short as
+/// its mean edge h. Biot (1957) gives E t³ k²/12 + E* / (2 k) at a wavelength 2π/k. Two edges and no bending
+/// term make E* h/2π. Returns `None` for other cells, and for membranes on no solid.
 fn wrinkling_forces(model: &Model, membrane: &Solid) -> Option<Vec<f64>> {
     if !matches!(membrane.cells, Cells::Membrane(..)) {
         return None;

@@ -1,4 +1,4 @@
-//! What a run reports about its critical time step, added mass and hourglass energy.
+//! Report of a run about its critical time step, added mass and hourglass energy.
 
 use std::fmt;
 
@@ -20,19 +20,19 @@ const MUCH_HOURGLASS: f64 = 0.05;
 /// The monitored critical time step.
 #[derive(Clone, Debug, Serialize)]
 pub struct StabilitySummary {
-    /// What the run does when the limit falls below its step.
+    /// Reaction of the run to a limit below its step.
     pub on_unstable: OnUnstableName,
-    /// How often the limit was checked.
+    /// Number of checks of the limit.
     pub checks: u64,
     /// The smallest limit seen [s]; `None` if it was never checked.
     pub smallest_limit: Option<f64>,
     /// The smallest limit over the running step.
     pub limit_over_step: Option<f64>,
-    /// When it was seen [s].
+    /// Time of the smallest limit [s].
     pub smallest_at: Option<f64>,
     /// Steps during which the limit was known to be below the whole step.
     pub steps_below: u64,
-    /// How often the run went from whole steps to cut ones.
+    /// Number of changes from whole steps to cut ones.
     pub cuts: u32,
     /// Beginning of the first step that was cut [s].
     pub first_cut: Option<f64>,
@@ -42,9 +42,9 @@ pub struct StabilitySummary {
     pub most_substeps: u32,
     /// Steps taken beyond the whole ones.
     pub extra_steps: u64,
-    /// How often the run went back after a step that failed, and halved its steps from there on.
+    /// Number of times that the run went back after a failed step and halved its steps from there on.
     pub halvings: u32,
-    /// Whether a node is free to move, so that there is a limit.
+    /// True if a node is free to move, so that a limit exists.
     #[serde(skip)]
     limited: bool,
 }
@@ -71,7 +71,7 @@ impl StabilitySummary {
         })
     }
 
-    /// Why the result may be wrong.
+    /// Returns the reason why the result may be wrong.
     fn doubt(&self) -> Option<String> {
         let fell = self.limit_over_step.is_some_and(|ratio| ratio < 1.0);
         (fell && self.on_unstable == OnUnstableName::Report)
@@ -134,7 +134,7 @@ impl AddedMass {
     }
 }
 
-/// What a user should know before trusting a result.
+/// Returns what a user should know before trusting a result.
 pub(crate) fn doubts(
     built: &Built,
     outcome: &PartOutcome,
@@ -168,7 +168,7 @@ pub(crate) fn hourglass_failure(world: &World, outcome: &Outcome) -> Option<Fail
     Some(Failure::new(FailureKind::Hourglass, message, Some(outcome.time)))
 }
 
-/// That hourglass control holds a share of the internal energy at a time [s].
+/// Warns that hourglass control holds a share of the internal energy at a time [s].
 fn held_by_hourglass(built: &Built, share: f64, time: f64, most: &str, remedy: &str) -> String {
     let of = match share < 10.0 {
         true => format!("{:.1} % of the internal energy", share * 100.0),
@@ -197,7 +197,7 @@ fn unstable_equilibria(built: &Built, outcome: &PartOutcome) -> Option<String> {
     ))
 }
 
-/// That a tool, moved nodes or a volume were held back, by how much at most and when.
+/// Warns that a tool, moved nodes or a volume were held back, with the longest lag and its time.
 fn held_back(HeldBack { name, is_volume, lag, time }: &HeldBack) -> String {
     let [lag, time] = [*lag, *time].map(number);
     match is_volume {

@@ -17,13 +17,13 @@ pub struct StrainSummary {
     pub body: String,
     /// The largest principal strain at top or bottom, its size.
     pub largest: f64,
-    /// That of the middle surface in the same triangle.
+    /// Strain of the middle surface in the same triangle.
     pub membrane: f64,
     /// The triangle, counted from 0.
     pub element: u32,
-    /// When it was seen [s].
+    /// Time of the largest strain [s].
     pub time: f64,
-    /// When 10 % was first seen to be exceeded [s].
+    /// Time at which a strain above 10 % was first seen [s].
     pub above_from: Option<f64>,
 }
 
@@ -66,7 +66,7 @@ impl ShellStrains {
         }
     }
 
-    /// What a user should know before trusting the result.
+    /// Returns what a user should know before trusting the result.
     pub fn doubts(&self) -> impl Iterator<Item = String> {
         self.0.iter().filter_map(|strain| {
             let StrainSummary { body, largest, membrane, element, time, above_from } = strain;

@@ -21,7 +21,7 @@ use super::{OutputError, StrainSummary, VolumeChange, constraints};
 pub struct Summary {
     /// `done`, `failed` or `interrupted`.
     pub status: &'static str,
-    /// Why it failed.
+    /// Reason of the failure.
     pub error: Option<Failure>,
     /// The bodies.
     pub bodies: Vec<BodySummary>,
@@ -41,7 +41,8 @@ pub struct Summary {
     pub critical_step: Option<f64>,
     /// The element that sets the bound.
     pub limiting_element: Option<LimitingElement>,
-    /// Each participant, of a scene with several; what follows is then of the first participant that has it.
+    /// The participants of a scene with several; later fields are then of the first participant that has
+    /// them.
     pub participants: Vec<ParticipantSummary>,
     /// The ties between participants.
     pub ties: Vec<TieSummary>,
@@ -49,9 +50,9 @@ pub struct Summary {
     pub guests: Vec<CoupledSurfaceSummary>,
     /// Cost of its equations; `null` where none were solved.
     pub solver: Option<Effort>,
-    /// How good the equilibria of a quasi-static run are; `null` of others.
+    /// Quality of the equilibria of a quasi-static run; `null` for other runs.
     pub equilibria: Option<Equilibria>,
-    /// Why a path by arc length ended before its last load step; `null` of all others.
+    /// Reason why a path by arc length ended before its last load step; `null` for all other runs.
     pub ended: Option<String>,
     /// The largest strain of each shell, over up to 1000 sampled instants.
     pub shell_strains: Vec<StrainSummary>,
@@ -72,7 +73,7 @@ pub struct Summary {
     pub real_time_factor: f64,
     /// The monitored critical time step; `null` of a quasi-static run.
     pub stability: Option<StabilitySummary>,
-    /// What mass scaling adds; `null` without it.
+    /// Effect of mass scaling; `null` without it.
     pub added_mass: Option<AddedMass>,
     /// Imbalance of the energies at the end, as a fraction of the largest; `null` of shells and with
     /// `implicit` and `static`.
@@ -83,7 +84,7 @@ pub struct Summary {
     /// Volume [m³] and pressure [Pa] of each constraint of volume at the end, by name.
     #[serde(serialize_with = "as_map")]
     pub volumes: Vec<(String, [f64; 2])>,
-    /// What to know before trusting the result.
+    /// Warnings to know before trusting the result.
     pub warnings: Vec<String>,
     /// Files written, as paths.
     pub files: Vec<String>,
@@ -186,7 +187,7 @@ pub(crate) fn output_failure(error: &OutputError, time: Option<f64>) -> Failure 
     Failure::new(FailureKind::Output, message, time)
 }
 
-/// That of a stopped run, and the checkpoint it left.
+/// Makes the failure of a stopped run, with the checkpoint that the run left.
 pub(crate) fn interrupted(time: f64, checkpoint: Option<&Path>) -> Failure {
     let way = match checkpoint {
         Some(path) => format!("go on with `--resume {}`", path.display()),
@@ -208,7 +209,7 @@ pub(crate) fn bodies(built: &Built) -> Vec<BodySummary> {
         let volume = |solid: &pliant_mechanics::model::Solid| -> f64 {
             (0..solid.cells.len()).map(|cell| solid.cells.volume(cell)).sum()
         };
-        // Of its own cells: its nodes may have the mass of a wall, too.
+        // Mass of its own cells: its nodes may carry the mass of a wall, too.
         let of_cells = || {
             let mut mass = vec![0.0; built.model.node_count()];
             solids.clone().for_each(|solid| solid.add_mass(&mut mass));

@@ -18,7 +18,7 @@ use super::{Frame, Output, OutputError, Written, time_of};
 pub(super) struct Series {
     folder: PathBuf,
     index: PathBuf,
-    /// The index as it was written last, and where its entries end.
+    /// The index as it was last written, and the position where its entries end.
     open: Option<(File, u64)>,
     name: String,
     times: Vec<f64>,
@@ -57,7 +57,7 @@ impl Series {
         &self.index
     }
 
-    /// Goes on after the frames of an interrupted run at its checkpoint.
+    /// Continues after the frames that an interrupted run had at its checkpoint.
     pub(super) fn take_up(&mut self, times: &[f64]) {
         self.times = times.to_vec();
         self.beyond = listed(&self.index).unwrap_or_default().into_iter().skip(times.len()).collect();
@@ -107,7 +107,7 @@ impl Series {
         let list =
             pvd_text(all.map(|(index, &time)| (time, self.listed_name(index)))).map_err(io::Error::other)?;
         replace(&self.index, |file| file.write_all(list.as_bytes()))?;
-        // It is listed anew as long as frames of an interrupted run are in it.
+        // The index is written as a whole as long as it lists frames of an interrupted run.
         let file = self.beyond.is_empty().then(|| reopen(&self.index).ok()).flatten();
         Ok(file.map(|file| (file, (list.len() - PVD_TAIL.len()) as u64)))
     }
@@ -176,7 +176,8 @@ fn frame_name(index: usize) -> String {
     format!("{index:06}.vtu")
 }
 
-/// The times that a list of frames names; where a run was stopped as it wrote there, those of whole entries.
+/// Reads the times in a list of frames. If a run was stopped while it wrote the list, only whole entries
+/// count.
 fn listed(index: &Path) -> Result<Vec<f64>, String> {
     let frames = read_torn_pvd(index).map_err(|error| error.to_string())?;
     Ok(frames.into_iter().map(|(time, _)| time).collect())
@@ -189,7 +190,7 @@ pub(super) fn last_time(folder: &Path, name: &str) -> Option<f64> {
     frames.last().map(|(time, _)| *time).filter(|_| there)
 }
 
-/// Whether a series begins with frames of these times; the reason if not.
+/// Checks that a series begins with frames of these times; returns the reason if not.
 pub(super) fn verify(folder: &Path, name: &str, times: &[f64]) -> Result<(), String> {
     if times.is_empty() {
         return Ok(());

@@ -62,7 +62,7 @@ fn a_design_that_is_not_there_is_answered_with_those_that_are() {
     }
 }
 
-/// How far two series of displacements are apart at their ends, over the size of the first.
+/// Distance between the last displacements of two series, over the size of the first.
 fn apart(a: &Workshop, b: &Workshop) -> f64 {
     apart_in([(a, "out/case/fields.pvd"), (b, "out/case/fields.pvd")])
 }
@@ -109,10 +109,11 @@ fn a_scene_of_every_kind_of_part_runs_on_a_device_as_on_the_processor() {
     assert!(gpu.read("out/case/summary.md").contains(json["device"].as_str().unwrap()));
 }
 
-/// The start of a scene in which two organs lie on a table, on each other and on themselves, and a grasper
-/// moves in, all with friction. Impulses are found to a thousandth of the deepest gap, in at most so many
-/// passes, and faces at the jaws come in another order: the impulses between the organs at an instant depend
-/// on the last digits, soon also in single and double precision on the processor. Places and energies do not.
+/// The start of a scene in which two organs lie on a table, on each other and on themselves. A grasper moves
+/// in, and all contacts have friction. The solver finds impulses to a thousandth of the deepest gap with a
+/// limited number of passes. Faces at the jaws come in another order. The impulses between the organs at an
+/// instant depend on the last digits, soon also between single and double precision on the processor. Places
+/// and energies do not.
 #[test]
 fn organs_and_a_grasper_touch_on_a_device_as_on_the_processor() {
     if !pliant_testing::has_gpu(adapters().len()) {
@@ -203,8 +204,8 @@ fn equations_of_shells_are_solved_on_a_device_as_on_the_processor() {
     assert!(apart < 1e-5, "displacements are {apart} apart");
 }
 
-/// Residuals in double precision end near 1e-15: the rest of the way to 1e-17 is the CPU's, whose residual is
-/// carried on from step to step.
+/// Residuals in double precision end near 1e-15. The CPU takes the rest of the way to 1e-17, as its residual
+/// is carried from step to step.
 #[test]
 fn solutions_that_a_device_leaves_to_the_processor_are_counted() {
     if !pliant_testing::has_gpu(adapters().len()) {
@@ -356,7 +357,7 @@ fn hands_and_forces_move_explicit_shells_on_a_device() {
     }
 }
 
-/// Displacements of a run that goes on elsewhere are those of one that does not, to 1e-5.
+/// Displacements of a run that continues on another device match an uninterrupted run to 1e-5.
 #[test]
 fn a_checkpoint_of_explicit_shells_goes_from_device_to_processor_and_back() {
     if !pliant_testing::has_gpu(adapters().len()) {
@@ -378,7 +379,7 @@ fn a_checkpoint_of_explicit_shells_goes_from_device_to_processor_and_back() {
         assert_eq!(json["device"] == "cpu", then == "cpu", "{}", resumed.err);
         let apart = apart(&whole, &workshop);
         assert!(apart < 1e-5, "from {begun} to {then} displacements are {apart} apart");
-        // The work of loads and motions goes on, too.
+        // The work of loads and motions continues, too.
         let [a, b] = [&whole, &workshop].map(|workshop| {
             let (names, rows) = workshop.table("out/case/history.csv");
             let column = names.iter().position(|name| name == "energy.external").expect("a column");

@@ -112,7 +112,7 @@ fn shells_of_an_image_become_a_wall() {
     assert!(output.out.contains("label 5, 8, 80 shells"), "{}", output.out);
 }
 
-/// Whether the mesh of a run came from the cache.
+/// True if the mesh of a run came from the cache, false if the run stored the mesh there, else `None`.
 fn cached(workshop: &Workshop, set: &[&str]) -> Option<bool> {
     let output = workshop.run(set);
     output.done();

@@ -1,5 +1,5 @@
-//! Runs of scenes with their files and words, in this process. One program for all files here; run those of a
-//! file with `cargo test -p pliant-run --test run resuming::`.
+//! Runs of scenes with their files and words, in this process. One program holds all files here; run the
+//! tests of a file with `cargo test -p pliant-run --test run resuming::`.
 
 #[cfg(feature = "gpu")]
 mod devices;

@@ -125,7 +125,7 @@ fn every_selection_finds_its_nodes_in_a_scene() {
         let line = output.out.lines().find(|line| line.starts_with("constraint `base`")).unwrap().to_owned();
         line.split_whitespace().rev().nth(1).unwrap().parse::<usize>().unwrap()
     };
-    // The other constraint would contradict most of them.
+    // The other constraint would contradict most cases.
     let hand = BLOCK.find("[constraint.hand]").unwrap();
     let free = format!("{}{}", &BLOCK[..hand], &BLOCK[BLOCK.find("[load.push]").unwrap()..]);
     for (selection, expected) in cases {
@@ -229,8 +229,7 @@ fn scale_and_at_bring_a_mesh_to_metres_and_in_place() {
     assert_close(high.x, 0.6, 1e-12, "right end [m]");
 }
 
-/// How much a hollow ball of 30 mm, with a wall of 3 mm, gives way to a pressure inside, in tets of an edge
-/// [m]: its energy [J].
+/// Energy [J] of a hollow ball of 30 mm with a wall of 3 mm under a pressure inside, in tets of an edge [m].
 fn inflated(workshop: &Workshop, edge: f64) -> f64 {
     let held = |name: &str, at: [f64; 3], components: &str| {
         format!(

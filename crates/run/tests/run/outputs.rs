@@ -1,4 +1,4 @@
-//! What a run writes: columns, arrays, reactions, carried surfaces, and results of whole scenes.
+//! Outputs of a run: columns, arrays, reactions, carried surfaces, and results of whole scenes.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -343,14 +343,14 @@ density = 1000
     let of = |a: &str, b: &str, c: &str| mass(&by_label.replace('A', a).replace('B', b).replace('C', c));
     let whole = mass("density = 1000");
     let parts = [of("1000", "1", "1"), of("1", "1000", "1"), of("1", "1", "1000")];
-    // Each part weighs its thousand, the rest a thousandth of it.
+    // Each part weighs its thousand, and the rest a thousandth of its part.
     assert_close(of("1000", "1000", "1000"), whole, 1e-9, "mass");
     assert_close(parts.iter().sum::<f64>(), whole * 1.002, 1e-9, "mass");
     assert!(parts.iter().all(|part| *part > 0.003), "{parts:?}");
 }
 
-/// A beam held at one end by a couple that its moved end makes: the moments balance, and the nodal reactions
-/// sum up to the reaction.
+/// A beam is held at one end by a couple that its moved end makes. The moments balance, and the nodal
+/// reactions sum up to the reaction.
 #[test]
 fn moments_of_reactions_balance_and_a_rotation_twists() {
     let rotate = "rotate = { axis = [0, 0, 2], centre = [0.05, 0.05, 0], angle = 0.3 }";

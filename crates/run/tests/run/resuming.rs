@@ -36,7 +36,7 @@ fn assert_resumes(scene: &str, threads: [&str; 3], what: &str) {
     assert!(fs::read(&again[0]).unwrap() == before);
     // Everything except the wall times in them has the same bits: the state, the samples, the schedules.
     let differ = fs::read(&again[1]).unwrap().iter().zip(&last).filter(|(a, b)| a != b).count();
-    // Solvers with equations tell the times of their three phases, too.
+    // Solvers with equations report the times of their three phases, too.
     let times = if scene.contains("model = ") { 4 } else { 1 };
     assert!(differ <= 8 * times + 4, "{what}: {differ} bytes differ, not only wall times and checksum");
 }
@@ -306,9 +306,9 @@ fn a_failing_resumed_run_loses_nothing() {
     assert_eq!(before.len(), after.len());
 }
 
-/// The list of a series that ends within an entry, or that has lost its end to an entry that was not
-/// finished, is whole after the next frame. One that ends before the frames of the checkpoint, or is broken
-/// elsewhere, is refused.
+/// A torn list of a series ends within an entry, or has lost its end to an unfinished entry. The next frame
+/// makes the list whole. A list that ends before the frames of the checkpoint, or is broken elsewhere, is
+/// refused.
 #[test]
 fn a_list_of_frames_that_is_torn_is_made_whole() {
     let workshop = Workshop::new(&resumable("hex8", "", true));
@@ -335,7 +335,8 @@ fn a_list_of_frames_that_is_torn_is_made_whole() {
     for (number, (frames, torn)) in torn.into_iter().enumerate() {
         let folder = format!("out/{number}");
         let checkpoint = stopped_run(&folder, torn);
-        // The second frame cannot be written: the first one has made the list whole, and kept what is beyond.
+        // The second frame cannot be written: the first one has made the list whole, and kept the later
+        // frames.
         let blocked = workshop.path(&format!("{folder}/fields/000007.vtu.tmp"));
         fs::create_dir(&blocked).unwrap();
         assert_eq!(workshop.resume(&checkpoint, &[]).status(), "failed");

@@ -37,7 +37,7 @@ fn a_run_whose_step_fails_goes_back_and_halves_its_steps() {
     let output = workshop.run(&[]).done();
     assert_eq!(output["stability"]["halvings"], 1, "{output}");
     assert!(workshop.read("out/case/summary.md").contains("went back 1 time"));
-    // Each instant once, and the rows before the state that it went back to are those of a run until then.
+    // Each instant appears once, and the rows before the rollback equal the rows of a run until then.
     let (names, rows) = workshop.table("out/case/history.csv");
     let times: Vec<f64> = rows.iter().map(|row| row[0]).collect();
     assert_eq!(times.len(), 401);

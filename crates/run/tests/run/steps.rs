@@ -438,8 +438,8 @@ fn a_body_whose_nodes_are_all_prescribed_has_no_limit_and_a_page_without_inf() {
     }
 }
 
-/// A slender beam under a load bends by small forces: a tolerance that leaves much of the way to go is told
-/// with an estimate that the true error bears out.
+/// A slender beam under a load bends by small forces. A tolerance that stops far from the equilibrium gives a
+/// warning, whose estimate matches the true error.
 #[test]
 fn equilibria_that_are_not_reached_are_warned_about_with_their_error() {
     let run = |tolerance: &str| {
@@ -472,8 +472,9 @@ fn equilibria_that_are_not_reached_are_warned_about_with_their_error() {
     }
 }
 
-/// Two bars that lean on each other under a growing force snap through. What they store falls short of the
-/// work of the force by what a snap sets free; led by a displacement they go down without one.
+/// Two bars that lean on each other under a growing force snap through. Their stored energy falls short of
+/// the work of the force by the energy that the snap releases. Led by a displacement the bars go down without
+/// a snap.
 #[test]
 fn a_snap_between_equilibria_is_told_by_the_energy_that_is_missing() {
     let truss = |load: &str| {

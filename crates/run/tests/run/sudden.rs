@@ -1,5 +1,5 @@
 //! Random bodies under sudden loads, and bodies that fall onto each other with friction, at the automatic
-//! step: neither parametric resonance nor contact must end their runs. All 500: `cargo test --release -p
+//! step. Neither parametric resonance nor contact must end their runs. All 500: `cargo test --release -p
 //! pliant-run --test run sudden:: -- --ignored --nocapture`.
 
 use std::f64::consts::FRAC_PI_4;
@@ -87,13 +87,13 @@ curve = "hold"
     )
 }
 
-/// How the run of a body went on.
+/// The end of the run of a body.
 #[derive(Clone, Copy, PartialEq)]
 enum End {
     Done,
     /// The automatic step was too long.
     Unstable,
-    /// The body turns a cell over at the same time at a tenth of the step: the step is not what is wrong.
+    /// The body turns a cell over at the same time at a tenth of the step: the step is not the cause.
     Collapsed,
 }
 
@@ -166,8 +166,8 @@ fn five_hundred_suddenly_loaded_bodies_run_a_hundred_thousand_steps() {
     assert!(collapsed <= 1 && saved <= 10);
 }
 
-/// The turns that let a falling block meet another one with a face, along an edge, or with a corner; faces
-/// and edges are parallel to those below.
+/// Rotations that let a falling block meet another one with a face, along an edge, or with a corner. Faces
+/// and edges are parallel to faces and edges below.
 fn turns() -> [Rotation3<f64>; 4] {
     let about = |axis: Vector3, angle: f64| Rotation3::from_axis_angle(&Unit::new_normalize(axis), angle);
     let on_corner =
@@ -175,8 +175,8 @@ fn turns() -> [Rotation3<f64>; 4] {
     [Rotation3::identity(), about(Vector3::z(), FRAC_PI_4), about(Vector3::x(), FRAC_PI_4), on_corner]
 }
 
-/// A block that falls onto a fixed one with friction, 0.1 mm above it at first: nodes meet nodes, edges or
-/// faces exactly, and edges lie on edges.
+/// A block that falls onto a fixed one with friction, from 0.1 mm above. Nodes meet nodes, edges or faces
+/// exactly, and edges lie on edges.
 fn meeting(seed: u64, folder: &Path) -> String {
     let mut random = Random::new(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15));
     (0..8).for_each(|_| _ = random.number());

@@ -1,4 +1,4 @@
-//! What several files here share.
+//! Functions that several files here share.
 
 use serde_json::Value;
 
@@ -10,7 +10,7 @@ pub fn assert_close(found: f64, expected: f64, tolerance: f64, what: &str) {
     );
 }
 
-/// Whether a number is another one within a part of it.
+/// True if a number equals another one within the fraction `within`.
 pub fn close(value: &Value, expected: f64, within: f64) -> bool {
     value.as_f64().is_some_and(|value| (value - expected).abs() <= within * expected.abs())
 }

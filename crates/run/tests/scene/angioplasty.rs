@@ -13,9 +13,9 @@ fn pressure(time: f64) -> f64 {
     1.2e5 * part
 }
 
-/// The lumen grows as long as the balloon is filled and comes back when it is emptied, softer deposits give
-/// way more, the balloon's pressure is balanced by the deposit and its own tension, and no edge goes through
-/// a triangle: the scene ends a run where one does.
+/// The lumen grows as long as the balloon is filled, and comes back when it is emptied. Softer deposits give
+/// way more. The deposit and the balloon's tension balance the balloon's pressure. No edge goes through a
+/// triangle: the scene ends a run where one does.
 #[test]
 #[ignore = "five minutes"]
 fn a_folded_balloon_widens_a_stenosis_and_leaves_it() {

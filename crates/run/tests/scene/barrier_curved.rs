@@ -4,8 +4,8 @@ use pliant_testing::scenes::{last_row, resumes, world};
 
 use super::barriers::{cloth, pressed};
 
-/// Cloth that falls on a ball and on itself by its curved surface: no edge is in a triangle of it in any
-/// step, and a resumed run has the same bits.
+/// Cloth falls on a ball and on itself by its curved surface. In no step an edge intersects a triangle of the
+/// surface, and a resumed run has the same bits.
 #[test]
 fn cloth_falls_by_its_curved_surface() {
     let text = cloth("").replace("friction = 0.5\n", "friction = 0.5\nsubdivision = 1\n");
@@ -13,8 +13,8 @@ fn cloth_falls_by_its_curved_surface() {
     resumes(&text);
 }
 
-/// What a ball presses a plate with comes out at its rim, with flat triangles and on the curved surface, by
-/// static and by implicit steps.
+/// The force of a ball on a plate comes out at the rim of the plate. The plate has flat triangles or a curved
+/// surface, and steps are static or implicit.
 #[test]
 fn a_plate_bears_a_ball_by_its_curved_surface() {
     let plate = |run: &str, more: &str| {

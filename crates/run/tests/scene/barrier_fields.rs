@@ -5,8 +5,8 @@ use pliant_testing::scenes::{last_row, resumes, run, world};
 
 use super::barriers::{HELD, pressed};
 
-/// A block of 40 × 40 × 20 mm of hexes 20 µm above a floor, which shrinks along z alone, pressed on its top
-/// by 50 Pa within 0.1 s.
+/// A block of 40 × 40 × 20 mm of hexes stands 20 µm above a floor and shrinks along z alone. A pressure of 50
+/// Pa presses its top within 0.1 s.
 fn standing(run: &str, floor: &str, more: &str) -> String {
     format!(
         "[scene]\nuntil = 1\n[run]\n{run}\n\
@@ -25,8 +25,8 @@ const IMPLICIT: &str = "solver = 'implicit'\nstep = 0.02";
 const UPRIGHT: &str =
     "[constraint.upright]\ntype = 'fix'\nbody = 'block'\nnodes = 'all'\ncomponents = ['x', 'y']\n";
 
-/// Under a load of 50 Pa the pressure of a node is 50 Pa, and the law of the barrier at its gap. Forces of
-/// nodes sum to that of the contact.
+/// Under a load of 50 Pa the pressure of a node is 50 Pa, and obeys the law of the barrier at its gap. Forces
+/// of nodes sum to the force of the contact.
 #[test]
 fn the_pressure_of_a_node_is_the_load_over_the_area_and_the_law_at_its_gap() {
     let all = "[output.all]\ntype = 'vtu'\nevery = 1\ndata = ['contact-force', 'contact-pressure', 'gap', 'slip']\n";
@@ -52,8 +52,8 @@ fn the_pressure_of_a_node_is_the_load_over_the_area_and_the_law_at_its_gap() {
         let law = 500.0 * (2.0 * (y_of_gap - 1.0) * y_of_gap.ln() + (y_of_gap - 1.0).powi(2) / y_of_gap);
         assert!((pressures[node] / law - 1.0).abs() < 1e-9, "{} {law}", pressures[node]);
         assert!(slips[node] < 1e-12, "{}", slips[node]);
-        // Hexes share a load among their corners in quarters, triangles in thirds: nodes within, which have
-        // all six of them, tell the pressure.
+        // Hexes share a load among their corners in quarters, triangles in thirds. Only inner nodes, with all
+        // six triangles, show the true pressure.
         if [x, y].iter().all(|x| *x > 0.01 && *x < 0.03) {
             inner += 1;
             off = f64::max(off, (pressures[node] / 50.0 - 1.0).abs());
@@ -69,8 +69,8 @@ fn the_pressure_of_a_node_is_the_load_over_the_area_and_the_law_at_its_gap() {
     assert!((sum / -row["contact.below.z"] - 1.0).abs() < 1e-9 && (sum / 0.08 - 1.0).abs() < 1e-3);
 }
 
-/// A floor that goes by 10 mm under a block that is held slides by 10 mm under each of its nodes, and 5 mm
-/// more on its way back; a floor that carries the block along does not slide. The slip ends with the touch.
+/// A floor that moves by 10 mm under a held block slides by 10 mm under each node. Its way back adds 5 mm. A
+/// floor that carries the block along does not slide. The slip ends with the touch.
 #[test]
 fn the_slip_of_a_node_is_the_way_of_the_floor() {
     let slips = |floor: &str, more: &str, friction: &str| {
@@ -92,7 +92,7 @@ fn the_slip_of_a_node_is_the_way_of_the_floor() {
     assert!(left.is_nan(), "{left}");
 }
 
-/// Pressure and slip of a block under a ball that is drawn over it go on with the same bits.
+/// Pressure and slip of a block under a ball that is drawn over it continue with the same bits.
 #[test]
 fn fields_go_on_with_the_same_bits_in_a_resumed_run() {
     let run = "solver = 'implicit'\nstep = 0.02\ncheckpoint = { every = 0.44 }";
@@ -107,8 +107,8 @@ fn fields_go_on_with_the_same_bits_in_a_resumed_run() {
     assert!(row["probe.top.slip"] > 1e-4 && row["probe.top.contact-pressure"] > 0.0, "{row:?}");
 }
 
-/// A balloon of a shell that bends, filled by volume, comes to lie against a tube around it: nothing of the
-/// volume is lost, the tube bears a part of the pressure, and what it does to the balloon adds up to nothing.
+/// A balloon of a shell that bends is filled by volume and comes to lie against a tube around it. No volume
+/// is lost, the tube bears a part of the pressure, and the sum of its forces on the balloon is zero.
 #[test]
 fn a_balloon_of_a_shell_is_filled_in_a_tube() {
     let text = "[scene]\nuntil = 1\n[run]\nsolver = 'implicit'\nstep = 0.02\n\

@@ -1,5 +1,5 @@
 //! Contact with the solvers `implicit` and `static`: a barrier keeps surfaces apart, from the text of a scene
-//! to its outputs, and what is refused.
+//! to its outputs, and refusals.
 
 use pliant_scene::BuiltBody;
 use pliant_testing::PeakMemory;
@@ -24,7 +24,8 @@ const FLOOR: &str = "[obstacle.floor]\nshape = 'half-space'\nat = [0, 0, -2e-5]\
                      [contact.below]\nbetween = ['block', 'floor']\nfriction = 0.5\n";
 pub(super) const HELD: &str = "[constraint.base]\ntype = 'fix'\nbody = 'block'\nnodes = { set = 'z-min' }\n";
 
-/// Bins of candidates are as wide as a part of the barrier, but only so many: 1e-12 m asked for 20 GB.
+/// Bins of candidates are as wide as a part of the barrier, but their number is limited: 1e-12 m asked for 20
+/// GB.
 #[test]
 fn a_tiny_barrier_distance_takes_no_memory() {
     let text = "[scene]\nuntil = 0.02\ngravity = [0, 0, -9.81]\n[run]\nthreads = 1\nsolver = 'implicit'\nstep = 0.01\niterations = 5\n\
@@ -39,8 +40,8 @@ fn a_tiny_barrier_distance_takes_no_memory() {
     before.assert_rise_below(512 << 10);
 }
 
-/// What presses on top comes out below: at the floor by a barrier as well, in time, and at the constraint in
-/// equilibrium. The gap of the node under the ball is within the barrier.
+/// The force on top comes out below: in motion at the floor by a barrier, in equilibrium at the constraint.
+/// The gap of the node under the ball is within the barrier.
 #[test]
 fn a_tool_presses_a_body_onto_an_obstacle_by_barriers() {
     let reach = 1e-3 * (0.04_f64 * 0.04 + 0.04 * 0.04 + 0.02 * 0.02).sqrt();
@@ -63,8 +64,8 @@ fn a_tool_presses_a_body_onto_an_obstacle_by_barriers() {
     assert!((forces[1] / forces[2] - 1.0).abs() < 0.01, "{forces:?}");
 }
 
-/// Bodies of one segmentation overlap by what their meshes round off. They are pushed apart by the distance
-/// of the barrier, so that the run starts without forces between them, and goes on.
+/// Bodies of one segmentation overlap by the round-off of their meshes. They are pushed apart by the distance
+/// of the barrier, so that the run starts without forces between them.
 #[test]
 fn bodies_that_overlap_are_pushed_apart_for_a_barrier() {
     let lid = "[body.lid]\nmesh = { block = { size = [0.03, 0.03, 0.01], cells = [4, 4, 2] }, as = 'hexes', at = [0.005, 0.005, 0.0195] }\n\
@@ -91,8 +92,8 @@ fn bodies_that_overlap_are_pushed_apart_for_a_barrier() {
     assert!(row["energy.internal"].is_finite(), "{row:?}");
 }
 
-/// Two bars of which a ridge of each goes through that of the other, with no node of either inside: no node
-/// has a way out, the ridges have.
+/// Two bars, each with a ridge that goes through the other's ridge, with no node of either inside. No node
+/// has a way out, but the ridges have.
 fn crossed(more: &str) -> String {
     format!(
         "[scene]\nuntil = 0.02\n[run]\nsolver = 'implicit'\nstep = 0.01\n\
@@ -114,7 +115,7 @@ fn ridges_that_go_through_each_other_are_parted() {
     let ways = pushed.only().unwrap().built.pushed.clone().unwrap();
     let highest = ways.iter().map(|u| u[2]).fold(0.0, f64::max);
     assert!((2e-4..2e-3).contains(&highest), "{highest} m");
-    // One table for all pairs asks for each of them.
+    // One table for all pairs asks for each pair.
     let all = crossed("separate = true").replace("['lower', 'upper']", "['all', 'all']");
     assert!(world(&all).unwrap().only().unwrap().built.pushed.is_some());
     assert!(last_row(&crossed("separate = true"))["energy.internal"] > 0.0);
@@ -200,8 +201,8 @@ fn a_sheet_hangs_in_a_funnel() {
     assert!((ends[0] - ends[1]).abs() < 2e-4, "{ends:?}");
 }
 
-/// Steps whose iterations run out are taken as they are, with no edge in a triangle in any of them, and
-/// counted.
+/// Steps whose iterations run out are taken as they are and counted. In no step an edge intersects a
+/// triangle.
 #[test]
 fn steps_that_do_not_converge_have_no_intersection_either() {
     let text = cloth("")
@@ -218,8 +219,8 @@ fn steps_that_do_not_converge_have_no_intersection_either() {
     assert!(message.contains("`accept-unconverged` is for `solver = \"implicit\"`"), "{message}");
 }
 
-/// The block with a coat of a model on its top, on the nodes of the block or on a mesh of its own that is
-/// tied, which the ball presses.
+/// The block with a coat of a model on its top, which the ball presses. The coat lies on the nodes of the
+/// block, or on its own mesh that is tied.
 fn coated(run: &str, model: &str, mesh: &str, more: &str) -> String {
     let (mesh, tie) = match mesh {
         "on" => ("on = 'block'\nfaces = { set = 'z-max' }".to_owned(), ""),
@@ -237,10 +238,10 @@ fn coated(run: &str, model: &str, mesh: &str, more: &str) -> String {
         .replace("on = 'block', at = [0.02, 0.02, 0.02]", "on = 'coat', at = [0.02, 0.02, 0.02]")
 }
 
-/// What presses a tied coat presses the block below: on the same triangles as on a coat with the nodes of the
-/// block, on other meshes in balance with what holds the block. Nodes touch, so the force depends on where
-/// they are: a mesh with a node under the ball, too, gives the same to 1 %; one without, whose first four
-/// nodes touch 3.6 mm beside, 28 % more, with a coat of no stiffness as well.
+/// A force on a tied coat reaches the block below. On the same triangles it equals the force on a coat with
+/// the nodes of the block. On other meshes it balances the force that holds the block. Nodes touch, so the
+/// force depends on their places. A mesh with a node under the ball gives the same to 1 %. A mesh without
+/// one, whose first four nodes touch 3.6 mm away, gives 28 % more, with a coat of no stiffness as well.
 #[test]
 fn a_tied_coat_is_pressed_as_one_on_the_nodes_of_its_block() {
     for (run, model, balanced) in [

@@ -1,4 +1,4 @@
-//! Bars and threads: ligaments between bodies, with every solver, and what is refused.
+//! Bars and threads: ligaments between bodies, with every solver, and refusals.
 
 use pliant_testing::scenes::{assert_rows_agree, last_row, resumes, run, world};
 

@@ -1,5 +1,5 @@
 //! Constraints that bind nodes to each other, with every solver: a plate that tilts, rigid parts of a body,
-//! and what is refused.
+//! and refusals.
 
 use pliant_testing::scenes::{assert_rows_agree, last_row, resumes, run, world};
 
@@ -20,8 +20,8 @@ fn block(solver: &str, constraint: &str, more: &str) -> String {
 
 const MEAN: &str = "type = 'mean'\nbody = 'block'\nnodes = { set = 'z-max' }\nby = [0, 0, -0.002]\ncomponents = ['z']\nto = 0.5";
 
-/// A side load tilts the top under a plate that prescribes its mean; without one the mean is that of a face
-/// that is moved.
+/// A side load tilts the top under a plate that prescribes its mean. Without a side load the mean equals the
+/// mean of a moved face.
 #[test]
 fn a_plate_presses_and_tilts() {
     let flat = last_row(&block("solver = 'explicit'", MEAN, ""));
@@ -43,8 +43,8 @@ fn a_plate_presses_and_tilts() {
     assert!(summary.energy_balance.unwrap().abs() < 0.01, "{:?}", summary.energy_balance);
 }
 
-/// A rigid top in single and double precision: it turns under a side load and keeps its size, and a resumed
-/// run has the same bits.
+/// A rigid top in single and double precision turns under a side load and keeps its size; a resumed run has
+/// the same bits.
 #[test]
 fn a_rigid_part_turns_and_keeps_its_size() {
     let rigid = "type = 'rigid'\nbody = 'block'\nnodes = { half-space = { point = [0, 0, 0.0149], normal = [0, 0, 1] } }";
@@ -76,9 +76,9 @@ fn a_rigid_part_turns_and_keeps_its_size() {
     resumes(&text);
 }
 
-/// A plate on one half of the top and a bone in the other, a load that tilts both, a vessel wall that is tied
-/// into the bone: the same equilibrium by every solver and every way to solve its equations, to 1e-5 of the
-/// largest displacement and reaction.
+/// A plate lies on one half of the top, and a bone in the other. A load tilts both, and a vessel wall is tied
+/// into the bone. Every solver, with every way to solve its equations, finds the same equilibrium.
+/// Displacements and reactions agree to 1e-5 of the largest.
 #[test]
 fn bound_nodes_stand_where_every_solver_puts_them() {
     let plate = "type = 'mean'\nbody = 'block'\nby = [0, 0, -0.002]\ncomponents = ['z']\nto = 0.5\n\
@@ -146,9 +146,9 @@ fn a_rigid_part_may_turn_far_in_a_load_step() {
     }
 }
 
-/// A run of each solver that is taken up in the middle has the same bits; its energies balance. External work
-/// is a sum of trapezia between load steps, which miss 2.4e-4 of it (rigid part, static) with 10 of them,
-/// 6e-5 with 20: a work left out would be far more.
+/// A run of each solver that is resumed in the middle has the same bits; its energies balance. External work
+/// is a sum of trapezia between load steps. They miss 2.4e-4 of the work (rigid part, static) with 10 load
+/// steps, and 6e-5 with 20. A work left out would be far more.
 #[test]
 fn runs_with_bound_nodes_are_taken_up_with_the_same_bits() {
     let rigid = "type = 'rigid'\nbody = 'block'\nnodes = { half-space = { point = [0, 0, 0.0149], normal = [0, 0, 1] } }";
@@ -173,9 +173,9 @@ fn runs_with_bound_nodes_are_taken_up_with_the_same_bits() {
     }
 }
 
-/// A plate of shells that is clamped at one side, with a rigid strip at the other, which keeps its size and
-/// turns as one: the same equilibrium by every way to solve, and at rest after `implicit`. A mean of its
-/// nodes is where it was sent.
+/// A plate of shells is clamped at one side, with a rigid strip at the other, which keeps its size and turns
+/// as one. Every way to solve finds the same equilibrium, and so does `implicit` at rest. A mean of its nodes
+/// is where it was sent.
 #[test]
 fn a_rigid_end_of_a_shell_turns_with_its_nodes() {
     let plate = |solver: &str, more: &str| {

@@ -1,4 +1,4 @@
-//! Bodies that touch obstacles and tools, from the text of a scene to its outputs, and what is refused.
+//! Bodies that touch obstacles and tools, from the text of a scene to its outputs, and refusals.
 
 use pliant_testing::scenes::{last_row, resumes, run, world};
 
@@ -41,8 +41,8 @@ fn a_tool_presses_a_body_onto_an_obstacle() {
     }
 }
 
-/// A ball that grows presses like one that moves: it is drawn as large as it is, and an explicit run and an
-/// implicit one feel the same force.
+/// A ball that grows presses like one that moves. Pictures show its present size, and explicit and implicit
+/// runs find the same force.
 #[test]
 fn a_ball_that_grows_presses_a_body() {
     let small =
@@ -71,9 +71,9 @@ fn a_ball_that_grows_presses_a_body() {
     assert!((forces[0] / forces[1] - 1.0).abs() < 0.05, "{forces:?}");
 }
 
-/// The same on a GPU, as on the CPU in double precision. Both find impulses to a thousandth of the deepest
-/// gap predicted, with faces in another order. A stable step predicts at most four times the depth that
-/// forces hold, (ω Δt)² ≤ 4.
+/// A tool presses a body on a GPU as on the CPU in double precision. Both find impulses to a thousandth of
+/// the deepest gap predicted, with faces in another order. A stable step predicts at most four times the
+/// depth that forces hold, (ω Δt)² ≤ 4.
 #[cfg(feature = "gpu")]
 #[test]
 fn a_tool_presses_a_body_on_a_device() {
@@ -128,8 +128,8 @@ fn a_body_lies_on_another_one() {
     }
 }
 
-/// The same on a GPU: a lid that falls, slides and comes to rest, and a block on its floor, as on the CPU in
-/// double precision.
+/// A lid falls onto a block, slides and comes to rest, and the block on its floor. The GPU agrees with the
+/// CPU in double precision.
 #[cfg(feature = "gpu")]
 #[test]
 fn a_body_lies_on_another_one_on_a_device() {
@@ -166,7 +166,7 @@ fn all_touch_all() {
     assert_eq!(other["probe.top.displacement.x"], named["probe.top.displacement.x"]);
 }
 
-/// The same step with and without contact.
+/// Contact does not change the critical time step.
 #[test]
 fn contact_leaves_the_critical_step_as_it_is() {
     let with = world(&pressed("", "")).unwrap();

@@ -59,8 +59,8 @@ fn what_is_nearer_at_the_start_keeps_its_distance() {
     assert!(row["probe.top.displacement.z"].abs() < 1e-12 && row["energy.kinetic"] < 1e-20, "{row:?}");
 }
 
-/// Writes the pieces of a scene, with those that are held in one body `b0`, the others in `b1`; the nodes of
-/// `b0` that are held.
+/// Writes the pieces of a scene: the held pieces as one body `b0`, the others as `b1`. Returns the held nodes
+/// of `b0`.
 fn write_crack(folder: &Path) -> Vec<u32> {
     let scene = erleben().into_iter().find(|scene| scene.name == "wedge in a crack").unwrap();
     let mut held = Vec::new();
@@ -78,8 +78,8 @@ fn write_crack(folder: &Path) -> Vec<u32> {
     held
 }
 
-/// A wedge that falls into a crack (Erleben 2018) goes into its sides without a distance, and does not with
-/// the one that bodies keep. What is deeper than 1e-4 of the mean edge is counted, and ends no run.
+/// A wedge that falls into a crack (Erleben 2018) intersects its sides without a contact distance, and does
+/// not with the usual one. Intersections deeper than 1e-4 of the mean edge are counted, and end no run.
 #[test]
 fn intersections_are_counted() {
     let place = tempfile::tempdir().unwrap();

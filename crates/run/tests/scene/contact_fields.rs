@@ -12,7 +12,8 @@ use super::contact::{pressed, stacked};
 const FIELDS: &str = "[output.all]\ntype = 'vtu'\nevery = 0.25\n\
     data = ['displacement', 'contact-force', 'contact-pressure', 'gap', 'slip']\n";
 
-/// Forces of nodes in a series sum to those of the contacts in the table; what cannot touch has no value.
+/// Forces of nodes in a series sum to the forces of the contacts in the table; nodes that cannot touch have
+/// no value.
 #[test]
 fn fields_of_contacts_are_written_for_all_nodes() {
     let probe = "probes.foot = { on = 'block', at = [0.02, 0.02, 0], data = ['contact-force', 'contact-pressure', 'gap', 'slip'] }\nprobes.top";
@@ -177,7 +178,7 @@ fn pushed(world: &World, body: usize, at: [f64; 3]) -> [f64; 3] {
 }
 
 /// A lid that begins within a block: both give way, together by the overlap. The run starts deformed: its
-/// energies balance with what is stored at the start, and it ends where one ends that began apart.
+/// energies balance with the energy stored at the start, and it ends where a run ends that began apart.
 #[test]
 fn bodies_that_overlap_are_pushed_apart() {
     let text = overlapping(0.0015, "");
@@ -236,7 +237,7 @@ fn nodes_in_a_tool_are_pushed_onto_its_surface() {
     assert!(balance < 0.02, "{balance}");
 }
 
-/// A thin plate that begins a little within the upper side of the block, between and on nodes, is left on the
+/// A thin plate begins a little within the upper side of the block, between and on nodes. It is left on the
 /// side where it comes from.
 #[test]
 fn faces_are_pushed_to_the_side_of_their_nodes() {

@@ -6,8 +6,8 @@ use pliant_testing::scenes::{last_row, run, world};
 use super::contact::{pressed, stacked};
 use super::coupled_surfaces::column;
 
-/// The force of the tool comes out on the floor, in balance, in the mean of the last 0.2 s: nodes of averaged
-/// tets tremble in contact, so that the two forces of an instant differ by up to 9 %.
+/// Checks that the force of the tool comes out on the floor, in balance, in the mean of the last 0.2 s. Nodes
+/// of averaged tets tremble in contact, so the two forces of an instant differ by up to 9 %.
 fn goes_through(what: &str, text: &str) -> f64 {
     let out = tempfile::tempdir().unwrap();
     let folder = out.path().join("out");
@@ -84,8 +84,8 @@ fn contact_goes_with_every_element_law_and_way_to_step() {
     }
 }
 
-/// A lid touches only by the faces that are chosen: where these are beside the block, it falls past it; where
-/// they are all that meets it, nothing changes.
+/// Contact uses only the chosen faces. Without the faces that meet, the lid falls into the block; with these
+/// faces alone, the force stays the same.
 #[test]
 fn faces_choose_what_touches() {
     let text = stacked("", "");
@@ -122,8 +122,8 @@ fn threads_change_no_bit_in_contact() {
     assert_eq!(one, three);
 }
 
-/// Bodies, obstacles, tools and contacts whose tables are in another order come to the same bits; those with
-/// the bodies the other way round are in `contact::all_touch_all`.
+/// Another order of bodies, obstacles, tools and contacts gives the same bits; `contact::all_touch_all` tests
+/// the bodies the other way round.
 #[test]
 fn the_order_of_tables_changes_no_bit() {
     let more = "[tool.ball]\nshape = { sphere = { radius = 0.01 } }\nat = [0.02, 0.02, 0.0511]\nby = [0.003, 0, -0.004]\nto = 0.1\n\

@@ -1,7 +1,8 @@
 //! Scene files, NiftySim models and checkpoints of `corpus/`, the project's own scenes and a checkpoint made
-//! here, cut off and changed at random, the same every time: what they say or an error, never a panic, and no
-//! memory beyond what the file justifies. In a process of its own, whose largest memory is measured. The fuzz
-//! targets `scene`, `niftysim` and `checkpoint` go on from here.
+//! here, cut off and changed at random. The changes are the same every time. Reading them gives a result or
+//! an error, never a panic, and takes no memory beyond what the file justifies. The test has a process of its
+//! own, whose largest memory is measured. The fuzz targets `scene`, `niftysim` and `checkpoint` start from
+//! the same files.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -36,7 +37,7 @@ fn corpus(ending: &str) -> Vec<(String, Vec<u8>)> {
     found
 }
 
-/// What is shown of a scene's mistakes; nothing where it has none.
+/// Shows a scene's mistakes; `None` without mistakes.
 fn mistakes(bytes: &[u8]) -> Option<String> {
     let text = String::from_utf8_lossy(bytes).into_owned();
     let read = Source::parse("scene.toml", text).and_then(|source| Scene::from_source(source, ".".into()));
@@ -117,7 +118,7 @@ fn broken_checkpoints_give_errors() {
     for _ in 0..3000 {
         let read = Checkpoint::from_bytes(&path, &Checkpoint::framed(&noise.damaged(body)));
         outcomes[usize::from(read.is_err())] += 1;
-        // What is read is held to the model before anything is done with it.
+        // A checkpoint is checked against the model before the run uses it.
         let _ = read.map(|checkpoint| checkpoint.continues(&world));
         // Without a fitting checksum no change is taken for a checkpoint.
         let changed = noise.damaged(&whole);

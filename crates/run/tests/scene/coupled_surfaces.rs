@@ -1,5 +1,5 @@
 //! Contact between participants: an explicit solid and implicit shells (S14), from the text of a scene to its
-//! outputs, and what is refused.
+//! outputs, and refusals.
 
 use nalgebra::UnitQuaternion;
 use pliant_sim::Simulation;

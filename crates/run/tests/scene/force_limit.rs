@@ -18,7 +18,7 @@ fn through(finger: &str, until: f64) -> String {
     )
 }
 
-/// It stops where its force is the limit, and a warning tells how far behind its trajectory.
+/// The tool stops where its force reaches the limit, and a warning says that it was held back.
 #[test]
 fn a_tool_driven_through_a_body_stops_at_its_limit() {
     for precision in ["", "precision = 'single'"] {
@@ -74,13 +74,13 @@ fn most_and_last(text: &str, column: &str) -> (pliant_run::Summary, f64, f64) {
     (summary, all.iter().copied().map(f64::abs).fold(0.0, f64::max), all[all.len() - 1].abs())
 }
 
-/// What tells that something was held back.
+/// Returns the warnings that something was held back.
 fn warnings(summary: &pliant_run::Summary) -> Vec<&String> {
     summary.warnings.iter().filter(|text| text.contains("was held back by its `force-limit`")).collect()
 }
 
-/// The same by a barrier, in time and as equilibria: in no step the force is above the limit, and nothing is
-/// in anything.
+/// A barrier stops the tool at its limit, in time and as equilibria. In no step the force is above the limit,
+/// and no bodies intersect.
 #[test]
 fn a_tool_stops_at_its_limit_under_a_barrier() {
     for run_table in ["solver = 'implicit'\nstep = 0.02", "solver = 'static'\nload-steps = 60"] {
@@ -154,7 +154,7 @@ fn moved_nodes_stop_at_their_limit_under_a_barrier() {
     }
 }
 
-/// The same without anything to touch, in steps that are not iterated, too: nodes that stretch a body.
+/// Nodes that stretch a body stop at their limit, without contact, and in steps that are not iterated, too.
 #[test]
 fn moved_nodes_that_stretch_a_body_stop_at_their_limit() {
     for run_table in [
@@ -206,8 +206,8 @@ fn the_failure_of_a_body_that_a_tool_goes_through_names_the_tool() {
     assert!(failure.contains("where `finger` pushes too hard, give it a `force-limit`"), "{failure}");
 }
 
-/// A table that rises against the held side of a block stands off it, and the failure has the force: that of
-/// its barrier at the gap that is left. So do moved nodes.
+/// A table that rises against the held side of a block stops before it, and the failure reports the force.
+/// The force is the force of its barrier at the remaining gap. Moved nodes do the same.
 #[test]
 fn what_is_blocked_tells_its_force() {
     let (side, distance, stiffness) = (0.04, 1e-3, 1e5);

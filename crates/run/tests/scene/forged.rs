@@ -1,5 +1,5 @@
-//! Snapshots and checkpoints with bytes changed at random and a checksum that fits: a run that goes on or an
-//! error, never a panic and no run without end.
+//! Snapshots and checkpoints with bytes changed at random and a checksum that fits. The run continues or ends
+//! with an error, never with a panic, and always ends.
 
 use std::fs;
 use std::path::Path;
@@ -135,7 +135,7 @@ fn a_million_forged_snapshots_go_on_or_are_refused() {
     assert!(attempts.panics.is_empty(), "{attempts}");
 }
 
-/// As above.
+/// Forged checkpoints from seed 20 to 1500, as in the shorter test.
 #[test]
 #[ignore = "ten minutes"]
 fn many_forged_checkpoints_go_on_or_are_refused() {

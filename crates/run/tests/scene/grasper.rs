@@ -5,8 +5,8 @@ use pliant_sim::Simulation;
 use pliant_sim::contact::pose::Pose;
 use pliant_testing::scenes::{last_row, resumes, run, scene, world};
 
-/// A flap of 30 × 6 × 20 mm on a floor, and jaws around it that close in 0.3 s and go up by 30 mm until 0.8
-/// s.
+/// A flap of 30 × 6 × 20 mm on a floor, and jaws around it. The jaws close in 0.3 s and go up by 30 mm until
+/// 0.8 s.
 fn flap(run: &str, tool: &str, friction: f64, until: f64) -> String {
     format!(
         "[scene]\nuntil = {until}\ngravity = [0, 0, -9.81]\n[run]\n{run}\n\
@@ -66,7 +66,7 @@ fn jaws_hold_as_if_tied_until_they_open() {
     );
 }
 
-/// What jaws hold is in the checkpoint.
+/// The checkpoint holds the nodes that jaws hold.
 #[test]
 fn a_run_with_closed_jaws_goes_on_in_the_same_bits() {
     resumes(&flap(
@@ -77,8 +77,8 @@ fn a_run_with_closed_jaws_goes_on_in_the_same_bits() {
     ));
 }
 
-/// The same work by a program: it closes the jaws and drives them up; a snapshot on the way leads to the same
-/// bits.
+/// A program does the same work: it closes the jaws and drives them up. A snapshot on the way leads to the
+/// same bits.
 #[test]
 fn a_program_closes_jaws_and_drives_them() {
     let text = flap("", "opening = { angle = 0.4, curve = 'hold' }\nideal-grip = 0.2", 0.0, 2.0);
@@ -152,8 +152,8 @@ fn a_grasper_moves_while_it_closes() {
     assert!(prints.iter().all(|print| *print == prints[0]), "{prints:?}");
 }
 
-/// A tool that cannot be there in time without passing over nodes arrives later; a tool that is not there,
-/// and numbers that are none.
+/// A tool arrives later if it cannot be there in time without passing over nodes. Unknown tools and numbers
+/// that are not finite are refused.
 #[test]
 fn impossible_goals_are_told() {
     let world = world(&flap("", "opening = { angle = 0.4, curve = 'hold' }", 0.0, 2.0)).unwrap();

@@ -1,5 +1,5 @@
-//! Grips on a shell and a solid: a strip that is held at one end and pulled at the other, with each solver of
-//! shells, and a bar with the implicit ones. The hand's force is that of its spring, and the clamp holds
+//! Grips on a shell and a solid. A strip is held at one end and pulled at the other, with each solver of
+//! shells, and a bar with the implicit ones. The hand's force is the force of its spring, and the clamp holds
 //! against it and the weight.
 
 use std::sync::Arc;

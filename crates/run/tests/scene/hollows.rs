@@ -5,7 +5,7 @@ use std::path::Path;
 use pliant_geometry::{CellKind, Mesh, Vector3, io};
 use pliant_testing::scenes::last_row;
 
-/// A block of 60 mm on the floor of a hollow thing, drawn into the wall beside it by gravity.
+/// A block of 60 mm on the floor of a hollow thing; gravity draws it into the wall at its side.
 fn block(shape: &str, until: f64) -> String {
     format!(
         "[scene]\nuntil = {until}\ngravity = [6, 0, -9.81]\n[run]\nsolver = 'implicit'\nstep = 5e-3\n\
@@ -33,8 +33,8 @@ fn box_file(folder: &Path, edge: f64) -> String {
 /// Its weight and what draws it aside [N].
 const PULL: [f64; 2] = [0.06 * 0.06 * 0.06 * 1000.0 * 6.0, 0.06 * 0.06 * 0.06 * 1000.0 * 9.81];
 
-/// Where the lower edge lies on floor and wall, both push: together they hold the block against both
-/// components of gravity.
+/// If the lower edge lies on floor and wall, both push: together they hold the block against both components
+/// of gravity.
 #[test]
 fn a_block_slides_into_the_corner_of_a_hollow() {
     let folder = tempfile::tempdir().unwrap();

@@ -72,8 +72,8 @@ fn a_resumed_run_of_a_growing_stiffness_ends_in_the_same_bits() {
     }
 }
 
-/// A constant `hourglass` is kept as it is given: the run ends with most of its energy in hourglass modes,
-/// writes all that it should, and fails unless the scene allows so much.
+/// A constant `hourglass` is kept as it is given. The run ends with most of its energy in hourglass modes and
+/// writes its outputs. It fails unless the scene allows that share.
 #[test]
 fn a_run_that_ends_in_hourglass_modes_fails_after_its_outputs() {
     for solver in ["solver = 'quasi-static'", "solver = 'explicit'"] {

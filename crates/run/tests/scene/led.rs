@@ -41,8 +41,7 @@ fn height(simulation: &mut Simulation) -> f64 {
     simulation.frame().unwrap().tool("ball").unwrap().pose.translation.z
 }
 
-/// The same goal again at each step: the tool stands where it stood, goes on at the same pace, and meets the
-/// same force.
+/// A tool that gets the same goal again at each step keeps its place and pace, and meets the same force.
 #[test]
 fn a_tool_that_is_led_again_goes_on() {
     let goal = Pose::translation(0.03, 0.03, 0.072);

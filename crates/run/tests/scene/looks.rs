@@ -1,5 +1,5 @@
-//! Who looks at an instant, takes a state there and goes on from it changes no bit of what follows. Scenes
-//! that resume ([`scenes::resumes`]) are held to it, too.
+//! A program that looks at an instant, takes a state there and continues from it changes no bit of later
+//! states. Scenes that resume ([`scenes::resumes`]) are held to it, too.
 
 use pliant_testing::scenes;
 

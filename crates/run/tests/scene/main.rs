@@ -1,4 +1,4 @@
-//! Scenes without the binary. One program for all files here; run those of a file with
+//! Scenes without the binary. One program holds all files here; run the tests of a file with
 //! `cargo test -p pliant-run --test scene grips::`.
 
 mod angioplasty;

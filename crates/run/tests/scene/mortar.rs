@@ -1,5 +1,5 @@
 //! Faces of solids joined by mortar rows: patch tests in either order, planes of symmetry through the joint,
-//! curved joints, and what is refused.
+//! curved joints, and refusals.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -12,8 +12,8 @@ use pliant_testing::scenes::{last_row_in, resumes, run, world};
 /// Edge of the blocks [m].
 const SIZE: f64 = 0.02;
 
-/// A cube of so many cells along each edge above a height [m], its points moved by up to a fifth of a cell
-/// along the sides that they are on.
+/// A cube with a number of cells along each edge above a height [m]. Its points are moved by up to a fifth of
+/// a cell along the sides that they are on.
 fn cube(cells: usize, kind: VolumeCell, height: f64, seed: u64) -> Mesh {
     let mut mesh = Block::new([SIZE; 3]).mesh(Resolution::Counts([cells; 3]), kind, usize::MAX).unwrap();
     let mut random = Random::new(seed);
@@ -102,8 +102,8 @@ fn ended(text: &str) -> Ended {
     Ended { moved, stress: stress.flat_map(along).collect(), row: last_row_in(out.path()) }
 }
 
-/// The largest difference of displacements from a uniform strain over the largest displacement, and that of
-/// stresses from their mean.
+/// Returns the largest difference of displacements from a uniform strain over the largest displacement, and
+/// the largest difference of stresses from their mean.
 fn uneven(ended: &Ended) -> [f64; 2] {
     let far = ended
         .moved
@@ -143,7 +143,7 @@ fn a_constant_stress_passes_in_either_order() {
     }
 }
 
-/// The same by dynamic relaxation and at rest after damped motions.
+/// Dynamic relaxation and rest after damped motions pass the patch test, too.
 #[test]
 fn every_solver_passes_it() {
     let place = tempfile::tempdir().unwrap();
@@ -164,7 +164,7 @@ fn every_solver_passes_it() {
     }
 }
 
-/// As points the same blocks leave the patch: the coarser one first is flagged.
+/// Ties of points on the same blocks fail the patch test: the order with the coarser block first is flagged.
 #[test]
 fn points_do_not_pass_it_and_say_so() {
     let place = tempfile::tempdir().unwrap();
@@ -273,8 +273,8 @@ fn methods_that_do_not_fit_are_refused_by_name() {
     assert!(notes.iter().any(|note| note.contains("(mortar)")), "{notes:?}");
 }
 
-/// A quarter of a ring of one cell along z, between radii [m], of so many cells round it and across it, the
-/// inner points moved along it.
+/// A quarter of a ring of one cell along z, between radii [m], with a number of cells round it and across it.
+/// The inner points are moved along it.
 fn ring(radii: [f64; 2], [round, across]: [u32; 2], seed: u64) -> Mesh {
     let mut random = Random::new(seed);
     let mut mesh = Mesh::default();
@@ -302,8 +302,8 @@ fn ring(radii: [f64; 2], [round, across]: [u32; 2], seed: u64) -> Mesh {
     mesh
 }
 
-/// Two rings that are joined at a cylinder, under a small pressure from inside, in plane strain: against
-/// Lamé's solution displacements converge with the square of the edges, and reactions balance the pressure to
+/// Two rings that are joined at a cylinder, under a small pressure from inside, in plane strain. Against
+/// Lamé's solution displacements converge with the square of the edges. Reactions balance the pressure to
 /// round-off.
 #[test]
 fn a_curved_joint_converges_with_the_square_of_the_edges_and_keeps_the_force() {

@@ -16,8 +16,8 @@ use pliant_sim::contact::touch::With;
 const MU: f64 = 1000.0;
 const KAPPA: f64 = 5000.0;
 
-/// How deep a node of a body may lie in another one [m]. Normals are those before a step: what slides across
-/// an edge in it, or turns, ends within by the square of its way.
+/// Allowed depth of a node of a body in another one [m]. Contact uses the normals before a step. A node that
+/// slides across an edge during the step, or turns, ends inside by the square of its way.
 const ACROSS_EDGES: f64 = 1e-6;
 
 /// A grid of hexahedra or tetrahedra as NiftySim lists it.
@@ -27,7 +27,7 @@ struct Grid {
 }
 
 impl Grid {
-    /// Hexahedra of a box; `kept` tells which.
+    /// Hexahedra of a box; `kept` selects them.
     fn hexes(counts: [usize; 3], size: [f64; 3], at: [f64; 3], kept: impl Fn([usize; 3]) -> bool) -> Self {
         let [nx, ny, nz] = counts;
         let node = |i: usize, j: usize, k: usize| (k * (ny + 1) + j) * (nx + 1) + i;
@@ -142,7 +142,7 @@ fn world(model: &str, folder: &Path) -> World {
     World::new(&scene).unwrap_or_else(|error| panic!("{}\n{}", error.plain(), imported.scene))
 }
 
-/// What a run came to.
+/// The result of a run.
 #[derive(Debug, Default)]
 struct Trajectory {
     /// The deepest that a node lay in a rigid thing [m], after any step.
@@ -153,7 +153,7 @@ struct Trajectory {
     forces: BTreeMap<String, Vector3<f64>>,
     /// The largest force of each contact [N].
     largest: BTreeMap<String, f64>,
-    /// Momentum over the sum of those of all nodes, at most.
+    /// Largest momentum over the sum of the momenta of all nodes.
     momentum: f64,
     displacements: BTreeMap<String, Vec<[f64; 3]>>,
 }
@@ -224,7 +224,7 @@ fn played(model: &str) -> Trajectory {
     trajectory
 }
 
-/// How deep a node of a body lies in another body [m].
+/// Returns the largest depth of a node of a body in another body [m].
 fn deepest(meshes: &[Mesh], firsts: &[u32], places: &[Vector3<f64>]) -> f64 {
     let moved = |mesh: &Mesh, first: u32| {
         let own = &places[first as usize..first as usize + mesh.points.len()];
@@ -300,8 +300,8 @@ fn plate(by: f64, nodes: &[usize]) -> String {
     )
 }
 
-/// A plate that slides freely on a cube displaces its top as a constraint does; its force is that of the
-/// closed form and of the floor.
+/// A plate that slides freely on a cube displaces its top as a constraint does. Its force equals the closed
+/// form and the force of the floor.
 #[test]
 fn a_plate_presses_a_cube_as_a_prescribed_displacement_does() {
     for tets in [false, true] {
@@ -327,7 +327,7 @@ fn a_plate_presses_a_cube_as_a_prescribed_displacement_does() {
     }
 }
 
-/// A cylinder and a probe are pressed into a block on its side, or grow into it: no node goes in, and the
+/// A cylinder and a probe are pressed into a block on its side, or grow into it. No node goes in, and the
 /// base carries their force.
 #[test]
 fn round_things_are_pressed_into_a_block() {
@@ -393,8 +393,8 @@ fn a_moving_rigid_sheet_presses_a_cube() {
         trajectory.in_things
     );
     assert!(trajectory.in_things < 1e-8, "{:e}", trajectory.in_things);
-    // It still moves at the end, at 5 mm/s: damping of 60/s takes its part of the force, of a mass of 1 kg at
-    // half of this speed.
+    // The body still moves at the end, at 5 mm/s. Damping of 60/s takes its part of the force, for a mass of
+    // 1 kg at half of this speed.
     let damped = 0.5 * 60.0 * 0.005;
     assert!((sheet / (exact - damped) - 1.0).abs() < 5e-3, "{sheet} N of {exact} N");
     assert!((ceiling - sheet - damped).abs() < 1e-3 * sheet.abs(), "{sheet} N and {ceiling} N");
@@ -463,7 +463,8 @@ fn pieces_of_one_mesh_touch() {
     let both = Grid { nodes: [&lower.nodes[..], &upper.nodes].concat(), cells };
     let corner = |k: usize| [0, 1, 2].map(|c| if k >> c & 1 == 1 { 0.3 } else { -0.1 });
     let corners: Vec<String> = (0..8).map(corner).map(|[x, y, z]: [f64; 3]| format!("{x} {y} {z}")).collect();
-    // Seen from within, each side goes round as from without in a box for bodies outside of it.
+    // The sides face inward: seen from within, each goes round as it does from without in a box that keeps
+    // bodies outside.
     let sides = "0 1 3  0 3 2  4 6 7  4 7 5  0 4 5  0 5 1  2 3 7  2 7 6  0 2 6  0 6 4  1 5 7  1 7 3";
     let model = format!(
         "<Model>\n{}{}{}<Constraint Type=\"Gravity\" NumNodes=\"all\" LoadShape=\"RAMPHOLD\"><AccelerationMagnitude>2\
@@ -543,7 +544,7 @@ fn a_fork_touches_itself() {
             system(5e-4, 1.5, 20.0, switch)
         )
     };
-    // The arms are straight and thin, and lower nodes have upper ones at their side: their heights tell who
+    // The arms are straight and thin, and lower nodes have upper ones at their side: their heights show who
     // is above.
     let gap = |trajectory: &Trajectory| {
         let height = |node: usize| grid.nodes[node][2] + trajectory.displacements["model"][node][2];
@@ -585,7 +586,8 @@ fn membranes_carry_their_part_of_a_force() {
     let faces = [flat(0.0), flat(0.1)].concat();
     for (kind, parameters, its) in [
         ("Linear", format!("{} {poisson}", 1e5), 1e5),
-        // ν = 0.5 is not that of the block, which holds the membrane by its sides: up to 4 % stiffer.
+        // Poisson's ratio 0.5 differs from the block, which holds the membrane by its sides: up to 4 %
+        // stiffer.
         ("NeoHookean", format!("{}", 1e5 / 3.0), 1e5),
     ] {
         let model = format!(

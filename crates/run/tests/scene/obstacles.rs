@@ -1,5 +1,5 @@
-//! Obstacles and tools from mesh files and images: balls in bowls, a brain in its skull, the cache, and what
-//! is refused.
+//! Obstacles and tools from mesh files and images: balls in bowls, a brain in its skull, the cache, and
+//! refusals.
 
 use std::path::Path;
 
@@ -29,13 +29,13 @@ fn ball_file(folder: &Path, name: &str, radius: f64) -> String {
     path.display().to_string()
 }
 
-/// Where the ball ends, sideways and downward [m], and the force on the bowl [N].
+/// Displacement of the ball at the end, sideways and downward [m], and the force on the bowl [N].
 fn rest(text: &str) -> [f64; 3] {
     let row = last_row(text);
     ["probe.middle.displacement.x", "probe.middle.displacement.z", "contact.falls.z"].map(|key| row[key])
 }
 
-/// Facets of the bowl lie up to 60 µm within it, and its grid is right to about 1 µm: the ball rests as high
+/// Facets of the bowl lie up to 60 µm within it, and its grid is right to about 1 µm. The ball rests as high
 /// and as far sideways.
 #[test]
 fn a_ball_in_a_bowl_of_triangles_rests_as_in_a_round_one() {
@@ -55,8 +55,8 @@ fn a_ball_in_a_bowl_of_triangles_rests_as_in_a_round_one() {
     }
 }
 
-/// The same bowl in millimetres, turned and shifted in its frame: as a mesh of its own and put in place by
-/// the scene.
+/// A bowl in millimetres, turned and shifted in its frame, is put in place by the scene and gives the same
+/// result.
 #[test]
 fn a_shape_from_a_file_stands_where_the_scene_puts_it() {
     let folder = tempfile::tempdir().unwrap();
@@ -90,8 +90,7 @@ fn image_file(folder: &Path) -> String {
     path.display().to_string()
 }
 
-/// A ball of voxels of 2 mm has its surface where a ball has it: to half a voxel at worst, to a tenth as a
-/// mean.
+/// A ball of voxels of 2 mm has the surface of a ball: to half a voxel at worst, to a tenth on average.
 #[test]
 fn a_bowl_may_come_from_an_image() {
     let folder = tempfile::tempdir().unwrap();

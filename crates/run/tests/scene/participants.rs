@@ -1,5 +1,5 @@
-//! One scene with solids and shells: each participant comes out as it does in a scene of its own, outputs see
-//! both at common instants, and a run that was interrupted goes on with the same bits.
+//! One scene with solids and shells. Each participant gives the result of its own scene, and outputs see both
+//! at common instants. An interrupted run continues with the same bits.
 
 use std::fs;
 use std::sync::Arc;
@@ -48,7 +48,7 @@ body = "strip"
 nodes = { set = "x-min" }
 "#;
 
-/// What the shell's own run says.
+/// The `[run]` keys of the shell's own scene.
 const IMPLICIT: &str = "solver = 'implicit'\nstep = 0.01\n";
 
 const HEAD: &str = "[scene]\nuntil = 0.2\ngravity = [0, 0, -9.81]\n";

@@ -9,7 +9,7 @@ use super::volumes::{FILLED, balloon};
 const STATIC: &str = "solver = 'static'\nload-steps = 10\ntolerance = 1e-10";
 const IMPLICIT: &str = "solver = 'implicit'\nstep = 0.05\ntolerance = 1e-10";
 
-/// What a run of a text warns of, its largest pressure [Pa], and its last row.
+/// Returns the warnings of the run of a text, its largest pressure [Pa], and its last row.
 fn run(text: &str) -> (String, f64, BTreeMap<String, f64>) {
     let out = tempfile::tempdir().unwrap();
     let folder = out.path().join("out");
@@ -75,8 +75,8 @@ fn a_balloon_is_filled_up_to_its_limit() {
     }
 }
 
-/// Called back it follows its curve again, to where it was at rest; a limit that is far away changes no bit,
-/// and a resumed run has the same ones.
+/// A balloon that is called back follows its curve again, to its volume at rest. A limit that is far away
+/// changes no bit, and a resumed run has the same bits.
 #[test]
 fn a_balloon_at_its_limit_is_called_back_and_resumed() {
     let there = "by = 4e-5\ncurve = { table = [[0, 0], [0.3, 1], [0.5, 1], [0.8, 0]] }";
@@ -95,8 +95,8 @@ fn a_balloon_at_its_limit_is_called_back_and_resumed() {
     }
 }
 
-/// A full balloon is pressed onto a floor: it lets out what its limit does not hold, and takes it in again
-/// when it is let go.
+/// A full balloon is pressed onto a floor. It lets out the volume that its limit does not hold, and takes it
+/// in again when it is released.
 #[test]
 fn a_balloon_that_is_pressed_lets_out_what_its_limit_does_not_hold() {
     let ball = |motion: &str| {
@@ -134,9 +134,9 @@ fn a_balloon_that_is_pressed_lets_out_what_its_limit_does_not_hold() {
     }
 }
 
-/// A load helps a balloon past the largest pressure that its wall bears, and falls. The pressure from then on
-/// comes to its limit where the wall gives way to more air, so that the balloon holds too little pressure or
-/// too much volume: no equilibrium keeps both.
+/// A load helps a balloon past the largest pressure that its wall bears, and falls. The wall then gives way
+/// to more air at the limit of the pressure. The balloon holds too little pressure or too much volume: no
+/// equilibrium keeps both.
 #[test]
 fn a_balloon_that_snaps_at_its_limit_ends_the_run_with_pressure_and_volume() {
     let volume = "by = 3e-4\ncurve = { table = [[0, 0], [0.5, 1]] }\npressure-limit = 11000";
@@ -165,7 +165,7 @@ fn a_balloon_that_snaps_at_its_limit_ends_the_run_with_pressure_and_volume() {
     assert!(row["volume.air"] < at_rest("membrane") + 1e-4, "{}", row["volume.air"]);
 }
 
-/// Other solvers have no such limit, and one that is none is refused.
+/// Other solvers have no such limit, and an invalid limit is refused.
 #[test]
 fn limits_of_pressure_that_cannot_be_kept_are_refused() {
     for solver in ["explicit", "quasi-static"] {

@@ -144,7 +144,8 @@ fn joined(random: &mut Random, equations: bool, damping: &str) -> String {
     all
 }
 
-/// Scenes that cannot be built or end in an error have nothing to go on from; most go on to their end.
+/// Looks at random scenes while they run, and resumes them there. Scenes that cannot be built or fail are
+/// left out; most run to their end.
 fn stopped_anywhere(seeds: std::ops::Range<u64>) {
     let (mut built, mut refused) = (0, 0);
     for seed in seeds {

@@ -11,11 +11,11 @@ use tempfile::TempDir;
 /// The time that runs take.
 const UNTIL: f64 = 0.1;
 
-/// All that is there from the start, and half of it that grows to the whole.
+/// Curves that begin complete, or begin at a half and grow to the whole, with their values at t = 0.
 const CURVES: [(&str, f64); 2] =
     [("curve = 'hold'", 1.0), ("curve = { table = [[0, 0.5], [0.02, 1], [0.1, 1]] }", 0.5)];
 
-/// The same in the end, from 0 on.
+/// A curve with the same end that begins at 0.
 const FROM_ZERO: &str = "curve = 'smooth-step'\nto = 0.02";
 
 /// Solvers of solids, and whether they are at t = 0 where their curves say.
@@ -75,8 +75,8 @@ fn off(word: &str, [one, other]: [&Row; 2]) -> f64 {
     of_word().map(|(name, value)| (value - one[name]).abs()).fold(0.0, f64::max) / largest
 }
 
-/// A run under a curve ends where one from 0 ends; it stands at t = 0 where its curve says, or at rest;
-/// energies are balanced.
+/// A run under a curve ends where one from 0 ends. At t = 0 it stands where its curve says, or at rest.
+/// Energies are balanced.
 #[track_caller]
 fn begins_where_its_curve_says(
     what: &str,
@@ -92,7 +92,7 @@ fn begins_where_its_curve_says(
         let [probes, reactions] = ["probe", force].map(|word| off(word, [&last, &wanted]));
         let energy = |row: &Row, name: &str| row[&format!("energy.{name}")];
         println!("{what}, {curve}: probes {probes:.1e}, forces {reactions:.1e}");
-        // What is left of the vibration that a sudden start sets off, and of what a load step allows.
+        // A rest of the vibration of a sudden start, and of the error that a load step allows.
         assert!(probes < 2e-3 && reactions < 2e-3, "{what}, {curve}: {probes:e} {reactions:e}");
         if let Some(place) = place {
             for (axis, whole) in ["x", "y", "z"].iter().zip(place) {
@@ -266,7 +266,7 @@ fn rigid_things_begin_where_their_curves_say() {
     }
 }
 
-/// With a control the other motions and loads go on, too, from where they begin.
+/// With a control the other motions and loads continue, too, from their start.
 #[test]
 fn a_control_leaves_other_motions_and_loads_alone() {
     let head = "solver = 'static'\nload-steps = 5";

@@ -1,5 +1,6 @@
-//! Solids of any law with the solvers `static` and `implicit`: the same equilibria as by dynamic relaxation,
-//! shells beside them in one system of equations, a resumed run with the same bits, and what is refused.
+//! Solids of any law with the solvers `static` and `implicit`. They find the same equilibria as dynamic
+//! relaxation, with shells in the same system of equations. A resumed run has the same bits, and some scenes
+//! are refused.
 
 use std::fs;
 
@@ -27,7 +28,7 @@ pub(super) fn block(solver: &str, element: &str, law: &str, more: &str) -> Strin
     )
 }
 
-/// What factors take is known before a run, where there are some.
+/// The memory of the factors is known before a run that needs them.
 #[test]
 fn a_check_tells_what_factors_take() {
     let law = format!("type = 'neo-hookean'\n{MATRIX}");
@@ -53,8 +54,7 @@ fn a_check_tells_what_factors_take() {
 pub(super) const MATRIX: &str = "young-modulus = 1e4\npoisson-ratio = 0.45";
 const COMPRESSIBLE: &str = "young-modulus = 1e4\npoisson-ratio = 0.3";
 
-/// The displacements of `static` are those of `quasi-static` to 1e-6 of the largest, its stresses to 1e-5,
-/// its reactions too.
+/// Displacements of `static` equal `quasi-static` to 1e-6 of the largest, and stresses and reactions to 1e-5.
 #[test]
 fn static_equilibria_are_those_of_dynamic_relaxation() {
     let ogden = "type = 'ogden'\npoisson-ratio = 0.45\n\
@@ -92,8 +92,8 @@ fn static_equilibria_are_those_of_dynamic_relaxation() {
     }
 }
 
-/// Laws that relax, in eight steps with a motion that is held after half of them: the equilibria of `static`
-/// are those of `quasi-static`, with stresses and reactions.
+/// Laws that relax, in eight steps with a motion that is held after half the steps. The equilibria of
+/// `static` equal the equilibria of `quasi-static`, with stresses and reactions.
 #[test]
 fn relaxing_equilibria_are_those_of_dynamic_relaxation() {
     let both = "prony = [{ part = 'isochoric', weight = 0.5, time = 0.3 }, { part = 'isochoric', weight = 0.2, time = 2 }, \
@@ -121,7 +121,7 @@ fn relaxing_equilibria_are_those_of_dynamic_relaxation() {
     }
 }
 
-/// Where two constraints hold the same component of a node, the first has its reaction: reactions and weight
+/// If two constraints hold the same component of a node, the first has its reaction: reactions and weight
 /// balance.
 #[test]
 fn reactions_of_shared_nodes_count_once() {

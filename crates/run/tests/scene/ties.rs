@@ -1,4 +1,4 @@
-//! Bodies tied to others whose meshes do not match, with every solver, and what is refused.
+//! Bodies tied to others whose meshes do not match, with every solver, and refusals.
 
 use pliant_format::Scene;
 #[cfg(feature = "gpu")]
@@ -50,9 +50,8 @@ fn a_coat_on_another_mesh_pulls_as_in_closed_form() {
     }
 }
 
-/// A vessel through a block that is bent, turned and pressed: the same by Newton's method, dynamic
-/// relaxation, and at rest after a damped motion; as a shell in the systems of equations with its rotations
-/// free.
+/// A vessel through a block that is bent, turned and pressed. Newton's method, dynamic relaxation, and rest
+/// after a damped motion agree. As a shell in the systems of equations its rotations are free.
 pub fn vessel(solver: &str, more: &str, model: &str) -> String {
     let law = format!("type = 'neo-hookean'\n{MATRIX}");
     let text = block(solver, "tet4", &law, more);
@@ -132,7 +131,7 @@ fn a_resumed_run_of_tied_bodies_ends_in_the_same_bits() {
     }
 }
 
-/// Another coat, and the start of a tie of it.
+/// Another coat, and the start of its tie.
 const SECOND: &str = "[body.second]\nmodel = 'membrane'\nmesh = { plate = { size = [0.04, 0.02], cells = [3, 2] }, at = [0, 0, 0.01] }\n\
                       law = 'coat'\ndensity = 1000\nthickness = 1e-4\n[tie.more]\n";
 
@@ -253,8 +252,8 @@ fn moved(text: &str) -> (Vec<[[f64; 3]; 2]>, std::collections::BTreeMap<String, 
     (all.collect(), pliant_testing::scenes::last_row_in(out.path()))
 }
 
-/// A block of crooked tets stretched freely, with a wall of no stiffness tied to its top, on its triangles
-/// and on others: the strain is uniform, and the wall takes it on.
+/// A block of crooked tets is stretched freely, with a wall of no stiffness tied to its top, on its triangles
+/// and on others. The strain is uniform, and the wall takes it on.
 #[test]
 fn a_uniform_strain_passes_through_ties() {
     let place = tempfile::tempdir().unwrap();
@@ -303,9 +302,9 @@ fn from_file(text: &str, file: &std::path::Path) -> String {
 }
 
 /// A stretched coat, stiffer than the block of crooked tets under it, on the triangles of the block and on
-/// others. Both sides of the block are held across, so that the rim of the coat is, and its top is free: the
-/// uniform strain is the exact solution of the discrete system, for the forces of a uniform stress vanish on
-/// each inner node of the coat, and with them Jᵀ of them.
+/// others. Both sides of the block are held across, and with them the rim of the coat; its top is free. The
+/// uniform strain is the exact solution of the discrete system. The forces f of a uniform stress vanish on
+/// each inner node of the coat, and so does Jᵀ f.
 #[test]
 fn coats_in_equilibrium_keep_a_uniform_strain() {
     let place = tempfile::tempdir().unwrap();
@@ -413,9 +412,9 @@ fn pull(stretch: [f64; 3]) -> f64 {
     BLOCK[1] * (BLOCK[2] * tissue_stress(stretch)[0] + 1e-4 * coat)
 }
 
-/// Runs a scene on the CPU in double precision and on a GPU until a time [s]: displacements of all bodies
+/// Runs a scene on the CPU in double precision and on a GPU until a time [s]. Displacements of all bodies
 /// differ by at most 1e-5, energies and the reaction of a constraint by 1e-4. Steps are cut at the same
-/// instants; how often they were.
+/// instants; returns the number of cuts.
 #[cfg(feature = "gpu")]
 pub fn agrees_on_a_device([cpu, gpu]: [&World; 2], until: f64, constraint: &str) -> u32 {
     let mut runs = [cpu, gpu].map(|world| world.simulation().unwrap());

@@ -4,7 +4,8 @@ use pliant_sim::ToolNow;
 use pliant_sim::contact::pose::Pose;
 use pliant_testing::scenes;
 
-/// What a tool feels that is pressed 4 mm into a block beside its middle, and rests there.
+/// Returns a tool that is pressed 4 mm into a block off its middle and rests there, with its force and
+/// torque.
 fn pressed(shape: &str, run: &str) -> ToolNow {
     let text = format!(
         r#"[scene]

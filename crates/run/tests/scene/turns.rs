@@ -1,8 +1,8 @@
-//! Rotations of shells that follow the solid that they are tied to or on, and what is refused.
+//! Rotations of shells that follow the solid that they are tied to or on, and refusals.
 
 use pliant_testing::scenes::{last_row, resumes, world};
 
-/// A strip of 60 × 20 × 0.5 mm, tied by one edge to the side of a block of stone that `more` holds; its
+/// A strip of 60 × 20 × 0.5 mm, tied by one edge to the side of a block of stone that `more` holds. Its
 /// bending stiffness is 2.08e-7 N m².
 fn strip(solver: &str, rotations: &str, more: &str) -> String {
     format!(
@@ -76,9 +76,9 @@ fn a_resumed_run_of_turns_that_follow_ends_in_the_same_bits() {
     }
 }
 
-/// A beam of two materials: a block of 80 × 10 × 10 mm with a wall of 2 mm on top, ten times as stiff, bent
-/// by its weight. Rotations that follow leave out that the tissue shears right under the wall: it bends a
-/// little less, on every mesh.
+/// A beam of two materials is bent by its weight. A block of 80 × 10 × 10 mm has a wall of 2 mm on top, ten
+/// times as stiff. With rotations that follow, the tissue right under the wall does not shear: the beam bends
+/// a little less, on every mesh.
 #[test]
 fn a_wall_whose_rotations_follow_bends_a_little_less_than_a_free_one() {
     let beam = |finer: u32, rotations: &str| {

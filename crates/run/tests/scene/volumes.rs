@@ -1,5 +1,5 @@
-//! Enclosed volumes with every solver: a balloon of a membrane, one of a shell, a cavity in a solid, and what
-//! is refused.
+//! Enclosed volumes with every solver: a balloon of a membrane, one of a shell, a cavity in a solid, and
+//! refusals.
 
 use std::collections::BTreeMap;
 
@@ -36,8 +36,8 @@ fn agree(first: &str, others: &[String]) {
     }
 }
 
-/// A membrane that is filled by two fifths stands where every solver puts it under a load from the side;
-/// nothing of the volume is lost.
+/// Every solver finds the same equilibrium of a membrane that is filled by two fifths, under a load from the
+/// side. No volume is lost.
 #[test]
 fn a_balloon_stands_where_every_solver_puts_it() {
     let load = "[load.side]\ntype = 'force'\non = 'balloon'\nnodes = { nearest = { point = [0.03, 0, 0], count = 7 } }\ntotal = [0, 2, 0]\nto = 0.5\n";
@@ -137,8 +137,8 @@ fn hollow_block() -> String {
     text + "CELL_TYPES 26\n" + &"12\n".repeat(26)
 }
 
-/// Water in the cavity of a block keeps its volume while the block is squeezed, with the same pressure by
-/// every solver; without it the cavity loses a tenth.
+/// Water in the cavity of a block keeps its volume while the block is squeezed; every solver finds the same
+/// pressure. Without water the cavity loses a tenth.
 #[test]
 fn a_cavity_keeps_its_volume() {
     let folder = tempfile::tempdir().unwrap();
@@ -176,8 +176,8 @@ fn a_cavity_keeps_its_volume() {
     assert!(height(&empty) < height(&row) - 1e-4, "{} {}", height(&empty), height(&row));
 }
 
-/// A full balloon on a floor is pressed by a ball: barriers keep them apart, no volume is lost, the pressure
-/// rises, and the floor bears what presses.
+/// A full balloon on a floor is pressed by a ball. Barriers keep them apart, no volume is lost, the pressure
+/// rises, and the floor bears the force of the ball.
 #[test]
 fn a_balloon_is_pressed_onto_a_floor() {
     let contacts = "[obstacle.floor]\nshape = 'half-space'\nat = [0, 0, -0.0312]\n\
@@ -198,7 +198,7 @@ fn a_balloon_is_pressed_onto_a_floor() {
     }
 }
 
-/// The work of the pressure is counted, and summary and plot tell volume and pressure.
+/// The work of the pressure is counted, and summary and plot show volume and pressure.
 #[test]
 fn the_pressure_works() {
     for solver in

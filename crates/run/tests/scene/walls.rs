@@ -1,5 +1,5 @@
-//! Thin walls on solids: membranes with every solver of solids, shells with those that solve equations, and
-//! what is refused.
+//! Thin walls on solids: membranes with every solver of solids, shells with solvers of equations, and
+//! refusals.
 
 use std::fs;
 
@@ -28,7 +28,7 @@ fn compare(one: &str, other: &str, limits: &[(&str, f64)]) {
     assert_rows_agree("walls", [&one, &other], limits);
 }
 
-/// The same coated block by Newton's method, dynamic relaxation, and at rest after a damped motion.
+/// A coated block by Newton's method, by dynamic relaxation, and at rest after a damped motion.
 #[test]
 fn coated_solids_stand_where_every_solver_puts_them() {
     let relaxed = coated("solver = 'quasi-static'\nload-steps = 4\ntolerance = 1e-9", "hex8", "", CAPSULE);
@@ -42,7 +42,7 @@ fn coated_solids_stand_where_every_solver_puts_them() {
     }
 }
 
-/// Of a wall with a law that relaxes, in single precision.
+/// A resumed run of a coated solid with a law that relaxes, in single precision.
 #[test]
 fn a_resumed_run_of_a_coated_solid_ends_in_the_same_bits() {
     let relaxing = CAPSULE.replace(
@@ -129,8 +129,8 @@ fn a_wall_is_written_with_its_own_fields_and_the_whole_mass_is_that_of_both() {
     }
 }
 
-/// A body of its own: a sheet of rubber pulled by an eighth stands as in closed form, with a probe and a
-/// carried surface on it.
+/// A sheet of rubber as a body of its own, pulled by an eighth, agrees with the closed form. It carries a
+/// probe and a surface.
 #[test]
 fn a_sheet_by_itself_is_pulled_as_in_closed_form() {
     let sheet = |solver: &str| {

@@ -1,4 +1,4 @@
-//! A model that is built, with the meshes of its bodies, and where points lie in these.
+//! A built model, with the meshes of its bodies and a locator of points in them.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use pliant_sim::contact::touch::Contacts;
 
 use super::contacts::Meet;
 
-/// A model, and what the outputs need beside it.
+/// A model, and further data for the outputs.
 #[derive(Clone, Debug)]
 pub struct Built {
     /// The model.
@@ -23,7 +23,7 @@ pub struct Built {
     pub surfaces: Vec<Mesh>,
     /// Contacts with obstacles and tools.
     pub contacts: Option<Arc<Contacts>>,
-    /// Whether states that are written are searched for intersections.
+    /// True if written states are searched for intersections.
     pub check_intersections: bool,
     /// Surfaces that bodies of other participants touch.
     pub(crate) meets: Vec<Meet>,
@@ -31,7 +31,7 @@ pub struct Built {
     pub pushed: Option<Arc<Vec<[f64; 3]>>>,
     /// Doubts that did not keep the model from being built.
     pub warnings: Vec<Diagnostic>,
-    /// What a user may want to know, a sentence each.
+    /// Remarks for the user, a sentence each.
     pub notes: Vec<String>,
 }
 
@@ -42,7 +42,7 @@ pub struct BuiltBody {
     pub name: String,
     /// The mesh in the user's numbering.
     pub mesh: Mesh,
-    /// Where it comes from, in words.
+    /// Origin of the mesh, in words.
     pub origin: String,
     /// Its boundary.
     pub boundary: Surface,
@@ -53,7 +53,7 @@ pub struct BuiltBody {
 }
 
 impl BuiltBody {
-    /// Whether it is made of lines.
+    /// True if the body is made of lines.
     pub(crate) fn is_of_bars(&self) -> bool {
         self.boundary.faces.is_empty()
     }
@@ -94,7 +94,7 @@ pub struct Located {
     pub cell: u32,
     /// Nodes of the mesh with their weights.
     pub weights: Vec<(u32, f64)>,
-    /// How far outside the cell the point is [m].
+    /// Distance of the point from the cell [m]; 0 inside.
     pub distance: f64,
 }
 

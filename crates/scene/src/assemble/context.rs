@@ -7,7 +7,7 @@ use pliant_format::source::Source;
 use super::Meshing;
 use crate::cache::MeshCache;
 
-/// A scene, and what was found out about it.
+/// A scene, with the findings about it.
 pub(super) struct Context<'s> {
     pub scene: &'s Scene,
     pub cache: &'s MeshCache,
@@ -49,7 +49,7 @@ impl<'s> Context<'s> {
     }
 }
 
-/// Lets a phase do what the one before it can: it has that in a field.
+/// Gives a phase the methods of the phase before, which it holds in a field.
 macro_rules! follows {
     ($phase:ident, $field:ident: $before:ident) => {
         impl<'s> std::ops::Deref for $phase<'s> {

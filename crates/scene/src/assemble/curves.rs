@@ -10,8 +10,8 @@ use pliant_mechanics::curve::{Curve, Shape};
 use super::Context;
 
 impl Context<'_> {
-    /// The curve of a motion or a load. What it has at t = 0 comes in within the first load step of a static
-    /// run, so that the step can be halved.
+    /// Returns the curve of a motion or a load. In a static run its value at t = 0 grows within the first
+    /// load step, so that the step can be halved.
     pub(super) fn course(&mut self, timing: &Timing, path: &[&str]) -> Option<Curve> {
         let curve = self.curve(timing, path)?;
         Some(self.eased(curve))
@@ -77,7 +77,7 @@ impl Context<'_> {
         Some(Curve { shape, from: timing.from, to })
     }
 
-    /// Says what the end of the scene cuts off.
+    /// Notes the part of a curve that the end of the scene cuts off.
     fn note_timing(&mut self, shape: &Shape, [from, to]: [f64; 2], path: &[&str]) {
         let (name, until) = (path.join("."), self.scene.scene.until);
         let (begins, ends) = match shape {

@@ -193,7 +193,7 @@ impl Context<'_> {
         }
     }
 
-    /// Refuses what means nothing to a solver without inertia.
+    /// Refuses keys that have no effect on a solver without inertia.
     pub(super) fn check_explicit_only(&mut self) {
         self.check_load_times();
         let scene = self.scene;

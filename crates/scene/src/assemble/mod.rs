@@ -2,7 +2,7 @@
 //! checked. All mistakes are collected with the user's own lines.
 //!
 //! The model is built in phases: [`Meshed`], [`Tied`], [`Loaded`], [`InContact`], [`Checked`], [`Started`].
-//! Each phase is a type that owns its results and can do what those before it can. The last one gives
+//! Each phase is a type that owns its results and has the methods of the phases before it. The last one gives
 //! [`Built`]. All phases share a [`Context`].
 
 mod bodies;
@@ -57,7 +57,7 @@ pub struct Meshing<'a> {
     pub now: &'static str,
 }
 
-/// As [`build_with`]; `watch` receives the progress of meshes of images.
+/// Builds like [`build_with`]; `watch` receives the progress of meshes of images.
 ///
 /// # Errors
 /// All mistakes that were found, with their places.
@@ -75,7 +75,7 @@ fn assembled(context: Context<'_>, shapes: Vec<BuiltBody>) -> Result<Built, Scen
     let tied = meshed.tied()?;
     let loaded = tied.loaded();
     let mut in_contact = loaded.in_contact();
-    // Bodies that are to have gaps between them get other shapes, and all begins anew.
+    // Bodies that need gaps between them get other shapes, and the assembly begins again.
     if let Some(ways) = in_contact.ways_to_gaps() {
         let (context, shapes) = in_contact.parted(&ways);
         return assembled(context, shapes);
@@ -88,7 +88,7 @@ fn assembled(context: Context<'_>, shapes: Vec<BuiltBody>) -> Result<Built, Scen
 /// The mesh alone of a body of a scene, in metres, with remarks on how it was made.
 ///
 /// # Errors
-/// What is wrong with the mesh, or that there is no such body.
+/// If the mesh has mistakes, or there is no such body.
 pub fn mesh_of(
     scene: &Scene,
     body: &str,

@@ -21,9 +21,9 @@ pub(super) struct ShellsOnDevice {
 pub(super) const STRIDE: u64 = 1024;
 
 impl Assembled {
-    /// So many steps, from an evaluated instant. Where a facet is broken on the device, the CPU decides: it
-    /// fails with the facet, or takes the step that only single precision cannot. The device then tries one
-    /// step, and twice as many each time that it takes all.
+    /// Takes a number of steps from an evaluated instant. Where a facet is broken on the device, the CPU
+    /// decides. It fails with the facet, or takes the step for which single precision is not enough. The
+    /// device then tries one step, and twice as many each time that it takes all.
     pub(super) fn advance_with_device(&mut self, steps: u64) -> Result<(), Failure> {
         let end = self.done + steps;
         let mut tried = steps;
@@ -46,9 +46,9 @@ impl Assembled {
         }
     }
 
-    /// So many steps on the device, from an evaluated instant, or those before a facet is broken there. It
-    /// sums the work of forces from outside but for what those at the end do in the last step: they are found
-    /// at the next evaluation, so the instant before is one step back, without forces.
+    /// Takes a number of steps on the device from an evaluated instant, or the steps before a facet is broken
+    /// there. Adds up the external work, except for the forces at the end of the last step: the next
+    /// evaluation finds them. The instant before is therefore set one step back, without forces.
     pub(super) fn advance_on_device(&mut self, steps: u64) -> Result<(), Failure> {
         let Some(ShellsOnDevice { stepper, pushed }) = &mut self.device else { return Ok(()) };
         let pull = |spring: &Spring| {

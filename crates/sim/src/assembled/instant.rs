@@ -1,4 +1,4 @@
-//! What an observer sees of it.
+//! Values of an assembled participant that an observer sees.
 
 use std::fmt::Write;
 

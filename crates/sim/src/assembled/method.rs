@@ -48,7 +48,7 @@ impl SolverMethod {
         self.equations_mut().and_then(|solver| solver.contact_mut())
     }
 
-    /// Has something act on what finds forces at an instant, and on the solver of equations.
+    /// Applies an action to the forces at an instant, and to the solver of equations.
     pub(super) fn act(
         &mut self,
         forces: impl FnOnce(&mut Forces),
@@ -72,7 +72,7 @@ impl SolverMethod {
         self.equations().map_or(&[], |solver| solver.attempts())
     }
 
-    /// How far moved nodes whose force is limited are behind their motion.
+    /// Returns the lags of moved nodes, with limited force, behind their motion.
     pub(super) fn lags(&self) -> &[Lag] {
         self.equations().map_or(&[], |solver| solver.lags())
     }

@@ -38,7 +38,7 @@ use crate::path::{Path, part_of};
 use crate::snapshot::{ContactState, ImplicitState, Iterated, PlainState};
 use crate::steps::Steps;
 
-/// Stiffness of the firmest grip over that of the stiffest cell.
+/// Stiffness of the firmest grip over the stiffness of the stiffest cell.
 const FIRM: f64 = 10.0;
 
 /// Iterations of Newton's method whose residuals are kept: the last ones.
@@ -56,24 +56,24 @@ pub(crate) struct Assembled {
     /// Whole steps done, and the time [s] they end at.
     done: u64,
     time: f64,
-    /// Which components of each node are held or moved, six a node.
+    /// Components of each node, six a node, that are held or moved.
     prescribed: Vec<bool>,
     /// The constraint that has the reaction of each component: the first, where two prescribe the same.
     owners: Vec<[u32; 3]>,
     /// Force [N] and moment [N m] on each node from outside at the instant before, six a node, with its
     /// positions and rotations.
     before: Option<(Vec<f64>, State)>,
-    /// The same forces at the instant that is evaluated.
+    /// The external forces and moments at the instant that is evaluated.
     outside: Vec<f64>,
     energies: Energies,
     reactions: Vec<[f64; 3]>,
-    /// What constraints of volume enclose.
+    /// Volumes that constraints of volume enclose.
     enclosed: Vec<Option<Enclosed>>,
     evaluated: bool,
-    /// Whether the work to the instant is entered.
+    /// True if the work to the instant is added up.
     entered: bool,
     effort: Effort,
-    /// What was taken before the run was resumed.
+    /// Effort before the run was resumed.
     effort_before: Effort,
     /// Residuals of the last iterations.
     convergence: VecDeque<Iterated>,
@@ -81,12 +81,13 @@ pub(crate) struct Assembled {
     path: Path,
     grips: Vec<Grip>,
     springs: Vec<Spring>,
-    /// What contacts do at the instant; `None` without contacts, and at the start before they are looked at.
+    /// Forces and states of contacts at the instant; `None` without contacts, and at the start before
+    /// contacts are evaluated.
     contact: Option<ContactNow>,
     /// Displacements of the solids at the instant last evaluated; `None` without solids.
     solids: Option<pliant_explicit::State<f64>>,
-    /// What takes explicit steps; `None`: the CPU. Forces at instants are found on the CPU, as are energies
-    /// and reactions.
+    /// The GPU that takes explicit steps; `None`: the CPU. The CPU finds forces, energies and reactions at
+    /// instants.
     #[cfg(feature = "gpu")]
     device: Option<ShellsOnDevice>,
 }
@@ -228,7 +229,7 @@ impl Assembled {
         let external = match &self.before {
             Some(_) if self.entered => self.energies.external,
             Some(_) => self.energies.external + self.work(),
-            // What is given at the start.
+            // At the start: the given energy.
             None => kinetic + stored,
         };
         // Backward Euler takes energy like a damper; a static path has no inertia to compare with.
@@ -262,7 +263,7 @@ impl Assembled {
         }
     }
 
-    /// What holds the three components from one on.
+    /// Returns the holding forces of the three components from one on.
     fn held(&self, first: usize) -> [f64; 3] {
         let forces = self.method.forces();
         let [internal, loads] = [forces.internal(), forces.loads()];
@@ -270,9 +271,9 @@ impl Assembled {
             .map(|at| if self.prescribed[at] { internal[at] - loads[at] } else { 0.0 })
     }
 
-    /// Puts a spring at each node of each grip. Together they pull with k (p − x̄), x̄ the mean of the nodes
-    /// by their weights; within a step they keep the shape of what is held, so that a spring has a node of
-    /// its own and the equations no entries more.
+    /// Puts a spring at each node of each grip. Together the springs pull with k (p − x̄), x̄ the mean of the
+    /// nodes by their weights. Within a step the springs keep the shape of the gripped nodes. So each spring
+    /// acts on a single node, and the equations have no more entries.
     fn put_springs(&mut self) {
         self.springs.clear();
         for grip in &self.grips {
@@ -327,7 +328,7 @@ impl Assembled {
         FailedLoadStep { number, of: self.steps.number, iterations: last.iterations(), residual }
     }
 
-    /// Keeps the iterations of the attempts of a step, those that failed, too.
+    /// Keeps the iterations of all attempts of a step, also of failed ones.
     fn note_attempts(&mut self, number: u64) {
         for (attempt, tried) in self.method.attempts().iter().enumerate() {
             self.effort.newton_iterations += tried.iterations() as u64;
@@ -391,7 +392,7 @@ impl Effort {
 }
 
 impl Assembled {
-    /// Goes on from where a run of the same bodies stood.
+    /// Continues from the state of a run of the same bodies.
     ///
     /// # Errors
     /// If its equations are too many.

@@ -1,4 +1,4 @@
-//! How a simulation leads it.
+//! Implementation of [`Participant`] for assembled bodies.
 
 use pliant_contact::pose::Leg;
 use pliant_explicit::{Clock, Wanted};
@@ -91,8 +91,9 @@ impl Participant for Assembled {
         }
     }
 
-    /// Explicit steps of 0.9 of the stable step stay stable up to it, as those of solids do. Assembled ones
-    /// are stable with any, and their equations stay well conditioned.
+    /// Returns the stiffness limit of a grip. Explicit steps of 0.9 of the stable step stay stable up to it,
+    /// as for solids. Implicit and static steps are always stable, and with this limit their equations stay
+    /// well conditioned.
     fn stiffest(&self, grip: &Grip) -> f64 {
         if !matches!(self.method, SolverMethod::Explicit(_)) {
             return FIRM * self.bodies.model.stiffest();
@@ -110,9 +111,9 @@ impl Participant for Assembled {
         [grip.position(&self.state, 0), grip.force(&self.state)]
     }
 
-    /// What was spent since then counts.
+    /// True if the participant can go back to a snapshot. Effort spent since then counts.
     fn goes_back_to(&self, snapshot: &Snapshot) -> bool {
-        // What is touched at the start is not known before contacts are looked at.
+        // Contacts at the start are unknown before their first evaluation.
         matches!(snapshot, Snapshot::Implicit(state) if state.contact.is_some() || self.method.contact().is_none())
     }
 
@@ -159,7 +160,8 @@ impl Participant for Assembled {
         let is_static = matches!(self.method, SolverMethod::Static(..));
         if is_static && self.state.time > self.time {
             self.time = self.state.time;
-            // Contacts without friction: that of the part of the step that was found is not known.
+            // Contacts restart without friction: the friction of the part of the step that was found is
+            // unknown.
             self.contact = None;
             (self.evaluated, self.entered) = (false, false);
         }

@@ -34,8 +34,8 @@ fn strip(steps: ShortSteps, of_stable: f64) -> Assembled {
     Assembled::new(&part, bodies).unwrap()
 }
 
-/// Explicit steps cost little but their forces, which whoever looks at an instant and the step from there on
-/// share.
+/// Explicit steps cost little more than their forces. A reading of an instant and the next step share the
+/// same forces.
 #[test]
 fn explicit_shells_find_their_forces_once_a_step() {
     let mut shells = strip(ShortSteps::default(), 0.9);
@@ -49,13 +49,13 @@ fn explicit_shells_find_their_forces_once_a_step() {
     assert_eq!(solver.phases().evaluations, 50);
 }
 
-/// Nodes that are turned by nearly 2 rad, at which facets fold over: single precision takes some for more. At
-/// rest they turn back, as on the CPU; those that spin on fail with the words of the CPU.
+/// Nodes turned by nearly 2 rad, at which facets fold over; in single precision some seem turned by more.
+/// From rest they turn back, as on the CPU. Nodes that keep spinning fail with the message of the CPU.
 #[cfg(feature = "gpu")]
 #[test]
 fn a_facet_at_the_edge_of_folding_over_goes_on_or_fails_on_a_device_as_on_the_processor() {
     let Some(device) = pliant_testing::found_or_skipped(Device::open(None)) else { return };
-    // The state after so many steps, and whether the first one was not the device's.
+    // The state after a number of steps, and whether the CPU took the first one.
     let run = |device: Option<&Device>, angle: f64, turn: f64| {
         let mut shells = strip(ShortSteps { device: device.cloned() }, 0.05);
         for node in 2..4 {

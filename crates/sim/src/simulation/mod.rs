@@ -75,7 +75,7 @@ pub struct Simulation {
     pushed: Vec<Vector<f64>>,
     /// States at the common instant before the step, where participants touch each other.
     before: Vec<OwnState>,
-    /// Whether forces, energies and reactions belong to the instant.
+    /// True if forces, energies and reactions belong to the instant.
     evaluated: bool,
     /// Ends long steps; the state before such a step is then kept.
     stop: Option<StopFlag>,
@@ -95,7 +95,7 @@ impl Simulation {
         Self::of(world, participants, Between::default())
     }
 
-    /// From a state of this world on.
+    /// Makes a simulation that continues from a state of this world.
     ///
     /// # Errors
     /// If a stepper can't be made, or the state is of another world.
@@ -110,8 +110,8 @@ impl Simulation {
         Self::of(world, participants, between)
     }
 
-    /// From a state that another world was in, with displacements, velocities and the history of relaxing
-    /// laws. `None` where this world has other meshes, solvers or number types.
+    /// Makes a simulation that continues from a state of another world, with displacements, velocities and
+    /// the history of relaxing laws. `None` where this world has other meshes, solvers or number types.
     ///
     /// # Errors
     /// If a stepper can't be made.
@@ -199,7 +199,8 @@ impl Simulation {
         self.world.step_from(self.time())
     }
 
-    /// Goes on to the next common instant; on a GPU as many as it takes at once, up to `most`. How many.
+    /// Steps to the next common instant; on a GPU takes as many steps as possible at once, up to `most`.
+    /// Returns their number.
     ///
     /// # Errors
     /// If forces can't be found or a step can't be taken. The simulation stays at the last good instant.
@@ -266,7 +267,8 @@ impl Simulation {
         if is_last { 0 } else { steps_to(time, now, step) }
     }
 
-    /// All that can be read at the instant; its forces are found. The next step goes on from it.
+    /// Returns all readable values at the instant, whose forces are found. The next step starts from this
+    /// instant.
     ///
     /// # Errors
     /// If forces can't be found.
@@ -275,11 +277,11 @@ impl Simulation {
         Ok(Frame { simulation: self })
     }
 
-    /// Finds forces of all participants at the instant, and reads back from devices what is wanted. It does
+    /// Finds forces of all participants at the instant, and reads the wanted values back from devices. Does
     /// nothing where they are found.
     ///
     /// # Errors
-    /// If those of a participant can't be found.
+    /// If the forces of a participant can't be found.
     pub fn evaluate(&mut self, wanted: Wanted) -> Result<(), Failure> {
         if !self.evaluated {
             if !self.meetings.is_empty() {
@@ -305,13 +307,13 @@ impl Simulation {
         Ok(())
     }
 
-    /// Whether forces, energies and reactions belong to the instant.
+    /// True if forces, energies and reactions belong to the instant.
     pub fn is_evaluated(&self) -> bool {
         self.evaluated
     }
 
-    /// Goes so many common instants on from an evaluated one, not more than the stride. `watch` hears how far
-    /// load steps are.
+    /// Advances by a number of common instants from an evaluated one, not more than the stride. `watch` gets
+    /// the progress of load steps.
     ///
     /// # Errors
     /// If a step of a participant can't be taken.
@@ -334,14 +336,14 @@ impl Simulation {
     }
 
     /// Looks at a flag from now on within load steps, steps whose equations are solved, and common steps of
-    /// participants. A step that it ends fails as [interrupted](Failure::is_interrupted), and the simulation
-    /// stays at the instant before, with the same bits as if the step had never begun.
+    /// participants. A step that the flag ends fails as [interrupted](Failure::is_interrupted). The
+    /// simulation then stays at the instant before, with the same bits as if the step had never begun.
     pub fn stop_on(&mut self, flag: &StopFlag) {
         self.participants.iter_mut().for_each(|participant| participant.stop_on(flag));
         self.stop = Some(flag.clone());
     }
 
-    /// Whether a flag may end steps before their end.
+    /// True if a flag may end steps before their end.
     fn can_stop_within(&self) -> bool {
         // States on a device would be read back before each common step.
         let in_memory = self.participants.iter().all(|own| own.stride() == 1);
@@ -490,9 +492,9 @@ impl Simulation {
         of.map(|(participant, ratio)| participant.stride() / ratio).min().unwrap_or(1).max(1)
     }
 
-    /// The state, at any instant. What goes on from it finds the forces of its instant again, with the same
-    /// bits where they were found. Hands and forces of [`push`](Self::push) are not part of it; a tool that
-    /// was driven after the forces were found begins its way in that step.
+    /// Returns the state, at any instant. A simulation that continues from it finds the forces of its instant
+    /// again, with the same bits where they were found. Hands and forces of [`push`](Self::push) are not part
+    /// of the state. A tool that was driven after the forces were found begins its way in that step.
     ///
     /// # Errors
     /// If a device fails.
@@ -508,8 +510,8 @@ impl Simulation {
         Ok(self.snapshot())
     }
 
-    /// The state as it lies in ordinary memory, without what participants note of their iterations: that of a
-    /// GPU is the one last read back.
+    /// Returns the state in ordinary memory, without the participants' notes of their iterations. For a GPU
+    /// this is the state last read back.
     pub fn snapshot(&self) -> State {
         let parts = self.world.parts.iter().zip(&self.participants).enumerate();
         let own = parts.map(|(index, (part, now))| {
@@ -525,7 +527,7 @@ impl Simulation {
         (self.evaluated && !self.meetings.is_empty()).then_some(&self.before[..])
     }
 
-    /// Goes back, or on, to a state of this world. Hands let go; forces of [`push`](Self::push) stay.
+    /// Goes to an earlier or later state of this world. Hands let go; forces of [`push`](Self::push) stay.
     ///
     /// # Errors
     /// If it is of another world, or a device fails. The simulation then stays as it was.
@@ -551,8 +553,8 @@ impl Simulation {
         Ok(())
     }
 
-    /// Brings some participants back to states of their parts; those that can't go back are made anew. Where
-    /// one can't be made, nothing changes.
+    /// Brings some participants back to states of their parts. Participants that can't go back are made anew.
+    /// Where one can't be made, nothing changes.
     fn put_back(
         &mut self,
         states: &[OwnState],
@@ -580,12 +582,12 @@ impl Simulation {
         Ok(())
     }
 
-    /// Goes on with other numbers (laws, loads, steps) from the present state. Hands let go; forces of
-    /// [`push`](Self::push) stay. False, and nothing changes, where the other world has other meshes, solvers
-    /// or number types.
+    /// Continues from the present state with other values (laws, loads, steps). Hands let go; forces of
+    /// [`push`](Self::push) stay. Returns false, and nothing changes, where the other world has other meshes,
+    /// solvers or number types.
     ///
     /// # Errors
-    /// Those of [`state`](Self::state), or if a stepper can't be made. The simulation then stays as it was.
+    /// Errors of [`state`](Self::state), or if a stepper can't be made. The simulation then stays as it was.
     pub fn exchange(&mut self, world: impl Into<Arc<World>>) -> Result<bool, Failure> {
         let state = self.state()?;
         match Self::continued(world, state, &self.world)? {
@@ -635,13 +637,13 @@ impl Simulation {
         Energies::total(self.instants().map(|now| now.energies()))
     }
 
-    /// Why it is at its end before its last step.
+    /// Reason why it is at its end before its last step.
     pub fn ended(&self) -> Option<&str> {
         self.participants.iter().find_map(|participant| participant.ended())
     }
 
-    /// After a step that failed: whether a state was found on the way that is worth showing. Its forces are
-    /// then found.
+    /// Returns true, after a step that failed, if a state was found on the way that is worth showing. Its
+    /// forces are then found.
     pub fn keeps_what_it_found(&mut self) -> bool {
         let [only] = &mut self.participants[..] else { return false };
         self.evaluated = only.keeps_what_it_found() && only.evaluate(Wanted::Everything).is_ok();
@@ -666,7 +668,7 @@ impl Simulation {
         (part, node - self.first_nodes[part])
     }
 
-    /// The number, over all participants, of a node of one of them.
+    /// Number, over all participants, of a node of one participant.
     pub fn node(&self, part: usize, node: u32) -> u32 {
         self.first_nodes[part] + node
     }
@@ -693,13 +695,13 @@ impl Simulation {
         all
     }
 
-    /// Pushes nodes with forces [N], one a node, counted over the models of all participants: they and no
-    /// others act from the next evaluation on, until they are replaced. An empty slice ends them. Their work
+    /// Pushes nodes with forces [N], one a node, counted over the models of all participants. Only these
+    /// forces act from the next evaluation on, until they are replaced. An empty slice ends them. Their work
     /// is external.
     ///
     /// # Errors
-    /// If there are not as many forces as nodes, a force is not finite, or a stepper takes none: that of a
-    /// GPU. No force is then replaced.
+    /// If there are not as many forces as nodes, a force is not finite, or a stepper takes none, as on a GPU.
+    /// No force is then replaced.
     pub fn push(&mut self, forces: &[Vector<f64>]) -> Result<(), Failure> {
         let nodes: usize = self.world.parts.iter().map(|part| part.model.node_count()).sum();
         if !forces.is_empty() && forces.len() != nodes {
@@ -769,26 +771,27 @@ impl Simulation {
     }
 }
 
-/// A participant that goes on from a state of its part.
+/// Makes a participant that continues from a state of its part.
 fn resume(part: &Part, own: OwnState) -> Result<Box<dyn Participant>, Failure> {
     let steps = own.steps().map(|(clock, step)| Before { clock, step, model: None });
     go_on(part, own.snapshot, steps)?.ok_or_else(|| Failure::input(&"the state is of another model"))
 }
 
-/// Keeps displacements of a participant at the addresses where those of another one of the same meshes were.
+/// Keeps displacements of a participant at the addresses where another one of the same meshes had its
+/// displacements.
 fn take_place_of(own: &mut Box<dyn Participant>, before: &mut Box<dyn Participant>) {
     if let (Some(here), Some(there)) = (own.displacements_mut(), before.displacements_mut()) {
         here.take_place_of(there);
     }
 }
 
-/// How far [s] others are, each by its place, beyond where a participant is after so many more steps.
+/// Time [s] that others, each by its index, are ahead of a participant after a number of further steps.
 fn ahead<'a>(parts: &'a [Part], done: &'a [u64], part: usize, more: u64) -> impl Fn(usize) -> f64 + 'a {
     let at = move |part: usize, more: u64| (done[part] + more) as f64 * parts[part].steps.step;
     move |other| at(other, 0) - at(part, more)
 }
 
-/// Whether a participant has the nodes and cells that another one has.
+/// True if two participants have the same nodes and cells.
 fn same_mesh(a: &Part, b: &Part) -> bool {
     let shells = |part: &Part| part.method.bodies().map(|bodies| bodies.model.rest.len());
     a.model.rest == b.model.rest && shells(a) == shells(b) && meshes(&a.model) == meshes(&b.model)

@@ -1,4 +1,4 @@
-//! What looks at instants.
+//! Observers of instants.
 
 use pliant_explicit::Wanted;
 use pliant_mechanics::Energies;
@@ -58,7 +58,7 @@ pub trait Observer {
         1
     }
 
-    /// What it reads at an instant, the last or not.
+    /// Values that it reads at an instant, the last or not.
     fn wanted(&self, _simulation: &Simulation, _last: bool) -> Wanted {
         Wanted::Everything
     }

@@ -11,11 +11,12 @@ use crate::part::Part;
 use crate::penalty::TieMemory;
 use crate::snapshot::Snapshot;
 
-/// The state of a simulation between two steps: a snapshot of all that another one needs to go on from there.
+/// The state of a simulation between two steps: a snapshot with all data that another simulation needs to
+/// continue.
 #[derive(Clone, Debug)]
 pub struct State(pub(super) Vec<OwnState>, pub(super) Between);
 
-/// What a restart needs of ties and contacts between participants.
+/// State of ties and contacts between participants that a restart needs.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Between {
     pub(super) ties: TieMemory,
@@ -23,7 +24,7 @@ pub(super) struct Between {
 }
 
 impl Between {
-    /// Whether participants have neither ties nor contacts.
+    /// True if participants have neither ties nor contacts.
     pub(super) fn is_empty(&self) -> bool {
         self.ties.is_empty() && self.coupled_surfaces.is_empty()
     }
@@ -33,7 +34,7 @@ impl Between {
     }
 }
 
-/// That of a participant.
+/// The state of a participant.
 #[derive(Clone, Debug)]
 pub(super) struct OwnState {
     pub(super) snapshot: Snapshot,
@@ -43,7 +44,7 @@ pub(super) struct OwnState {
 }
 
 impl OwnState {
-    /// How its steps are counted, and their length [s].
+    /// Clock of its steps, and their length [s].
     pub(super) fn steps(&self) -> Option<(Clock, f64)> {
         self.clock.map(|clock| (clock, self.step))
     }
@@ -71,17 +72,17 @@ impl State {
     }
 
     /// Halves the steps of all participants of its world that [cut theirs](World::cuts_steps) from here on.
-    /// False where there are none, or where that was done
+    /// False if no participant does, or after the steps were halved
     /// [three times](pliant_explicit::stability::MOST_HALVINGS).
     pub fn halve_steps(&mut self, world: &World) -> bool {
         let mut cut = self.0.iter_mut().zip(&world.parts).filter(|(_, part)| part.cuts_steps()).peekable();
         cut.peek().is_some() && cut.all(|(own, _)| own.snapshot.halve_steps())
     }
 
-    /// Whether it is one of a world.
+    /// Checks that the state belongs to a world.
     ///
     /// # Errors
-    /// If not.
+    /// If it does not.
     pub(super) fn check(&self, world: &World) -> Result<(), Failure> {
         let Self(parts, between) = self;
         let is_own = parts.len() == world.parts.len()

@@ -1,4 +1,4 @@
-//! What is constant.
+//! The constant part of a simulation.
 
 use std::sync::Arc;
 
@@ -22,8 +22,8 @@ pub struct World {
 }
 
 impl World {
-    /// Participants that meet at common instants: the steps of each become a multiple of those of the
-    /// participant with the fewest. All have the same duration.
+    /// Makes a world of participants that meet at common instants. The number of steps of each becomes a
+    /// multiple of the number of the participant with the fewest. All have the same duration.
     pub fn new(mut parts: Vec<Part>) -> Self {
         let common = parts.iter().map(|part| part.steps.number).min().unwrap_or(1);
         for part in &mut parts {
@@ -50,13 +50,13 @@ impl World {
         numbers().map(|number| number / common).collect()
     }
 
-    /// Whether the steps of a participant are cut where they are too long, so that those of a run can be
+    /// True if the steps of a participant are cut where they are too long. The steps of a run can then be
     /// halved.
     pub fn cuts_steps(&self) -> bool {
         self.parts.iter().any(Part::cuts_steps)
     }
 
-    /// Whether shorter steps may avoid a failure: of a participant whose steps are cut.
+    /// True if shorter steps may avoid a failure: the failure is of a participant whose steps are cut.
     pub fn shorter_steps_may_avoid(&self, failure: &Failure) -> bool {
         let of_body = |part: &Part| {
             part.model.bodies.iter().any(|body| failure.body.as_deref() == Some(body.name.as_str()))

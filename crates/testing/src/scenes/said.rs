@@ -1,4 +1,4 @@
-//! What a binary says.
+//! Output of a binary.
 
 use std::process::Output;
 
@@ -29,7 +29,7 @@ impl Said {
     /// The one object on standard output.
     ///
     /// # Panics
-    /// If there is none.
+    /// If there is no single object.
     pub fn json(&self) -> Value {
         let value: Value =
             serde_json::from_str(&self.out).unwrap_or_else(|error| panic!("{error}: {self:?}"));
@@ -40,7 +40,7 @@ impl Said {
     /// The object of a run that went well.
     ///
     /// # Panics
-    /// If it did not.
+    /// If it failed.
     #[track_caller]
     pub fn done(&self) -> Value {
         assert_eq!(self.code, 0, "{}", self.err);
@@ -54,7 +54,7 @@ impl Said {
         self.err.replace('│', " ").split_whitespace().collect::<Vec<_>>().join(" ")
     }
 
-    /// Whether standard error shows a line of the scene with something underlined in it.
+    /// True if standard error shows a line of the scene with something underlined in it.
     pub fn underlines(&self, line: &str) -> bool {
         let lines: Vec<&str> = self.err.lines().collect();
         lines.windows(2).any(|pair| {

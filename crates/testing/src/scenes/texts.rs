@@ -73,8 +73,8 @@ every = 0.004
 probes.middle = { on = "block", at = [0.05, 0.05, 0.05] }
 "#;
 
-/// A strip of 100 by 20 by 2 mm that is held at one end and bends under its weight: `body` has its keys of
-/// mesh and model (see [`SHELL`], [`HEXES`]), `run` those of the table `[run]`.
+/// A strip of 100 by 20 by 2 mm that is held at one end and bends under its weight. `body` has its keys of
+/// mesh and model (see [`SHELL`], [`HEXES`]), `run` the keys of the table `[run]`.
 pub fn strip(body: &str, run: &str) -> String {
     format!(
         r#"[scene]
@@ -255,11 +255,11 @@ pub const CORNERS: [[f64; 3]; 8] = [
     [0.1, 0.1, 0.1],
 ];
 
-/// Six tets that fill it.
+/// Six tets that fill the cube.
 pub const TETS: [&[u32]; 6] =
     [&[0, 1, 3, 7], &[0, 3, 2, 7], &[0, 2, 6, 7], &[0, 6, 4, 7], &[0, 4, 5, 7], &[0, 5, 1, 7]];
 
-/// A legacy VTK file of triangles, tets and hexes; `more` is what follows the cells.
+/// A legacy VTK file of triangles, tets and hexes; `more` follows the cells.
 pub fn vtk(points: &[[f64; 3]], cells: &[&[u32]], more: &str) -> String {
     let lines = |items: &mut dyn Iterator<Item = String>| items.map(|item| item + "\n").collect::<String>();
     let joined = |cell: &[u32]| cell.iter().map(u32::to_string).collect::<Vec<_>>().join(" ");

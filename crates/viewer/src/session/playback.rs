@@ -10,7 +10,6 @@ use pliant_run::Column;
 use pliant_scene::World;
 use pliant_sim::{State, StopFlag};
 
-use super::player::Former;
 use super::{FRAME, WRITTEN};
 use crate::device::Seen;
 use crate::followed::Followed;
@@ -105,6 +104,17 @@ pub(super) struct Playback {
     pub(super) marked: bool,
     /// True if every frame is copied to ordinary memory.
     pub(super) in_memory: bool,
+}
+
+/// A run before its numbers were changed.
+pub(super) struct Former {
+    pub(super) world: World,
+    pub(super) numbers: Vec<Number>,
+    pub(super) state: Option<State>,
+    pub(super) steps: u64,
+    pub(super) hold: Hold,
+    /// Moves and breaks that were recorded.
+    pub(super) recorded: [usize; 2],
 }
 
 impl Playback {

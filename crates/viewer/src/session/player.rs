@@ -17,13 +17,12 @@ use pliant_scene::World;
 use pliant_sim::gpu::{DevicePoints, PointValue};
 use pliant_sim::{Failure, State, StopFlag};
 
-use super::playback::Playback;
+use super::playback::{Former, Playback};
 use super::{BEHIND, FRAME, Frame, Order, SAMPLED, enter};
 use crate::device::point_value;
 use crate::followed::Followed;
 use crate::hand::{Hand, Hold, Point, Which};
 use crate::marks::marks;
-use crate::parameters::Number;
 use crate::recording::{Break, Done, Recording, Surface};
 use crate::samples::{HAND, SECOND_HAND, Sample};
 use crate::sound::{Sound, SoundStates};
@@ -37,17 +36,6 @@ pub(super) enum Left {
     Change,
     /// For the world before, since the changed numbers break the run.
     Refusal(String),
-}
-
-/// A run before its numbers were changed.
-pub(super) struct Former {
-    pub(super) world: World,
-    pub(super) numbers: Vec<Number>,
-    pub(super) state: Option<State>,
-    pub(super) steps: u64,
-    pub(super) hold: Hold,
-    /// Moves and breaks that were recorded.
-    pub(super) recorded: [usize; 2],
 }
 
 /// The solver's thread while it plays a world.

@@ -1,9 +1,9 @@
-//! Figure 9.5: a stenosis that a balloon widens. The thesis shows it and measures nothing; here it is held to
-//! an axisymmetric solution: a vessel of 1.5 to 2 mm with a deposit that narrows it to 0.75 mm, and a rigid
-//! cylinder in it that grows without friction.
+//! Figure 9.5: a stenosis that a balloon widens. The thesis shows no measurements, so the reference here is
+//! an axisymmetric solution. A deposit narrows a vessel of 1.5 to 2 mm to 0.75 mm. A rigid cylinder in the
+//! vessel grows without friction.
 //!
-//! The wall is as thick as a third of its radius, so both are solids. A quarter of one half is computed, the
-//! planes between them are held.
+//! The wall is as thick as a third of its radius, so both are solids. A quarter of one half is computed, with
+//! the planes of symmetry held.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::ops::Range;
@@ -28,7 +28,7 @@ use crate::reference;
 
 /// Half of the length [m].
 const LENGTH: f64 = 10e-3;
-/// Up to here [m] cells are short.
+/// End of the short cells [m].
 const NEAR: f64 = 5e-3;
 /// Radii [m] between deposit and wall, and outside.
 const RADII: [f64; 2] = [1.5e-3, 2e-3];
@@ -64,7 +64,7 @@ pub struct Divisions {
     pub along: [u32; 2],
 }
 
-/// A vessel that is widened: what is found at the throat at some radii of the balloon.
+/// Results for a widened vessel at its throat, at one radius of the balloon.
 #[derive(Clone, Copy, Debug)]
 pub struct Widened {
     /// Radius [m] of the inner surface at the throat.
@@ -77,7 +77,7 @@ pub struct Widened {
     pub iterations: usize,
 }
 
-/// A number of what is found.
+/// One number of the results.
 type Quantity = fn(&Widened) -> f64;
 
 /// Radius [m] of the inner surface at rest.
@@ -104,7 +104,7 @@ fn neo_hookean(young: f64) -> AnyLaw {
 struct Vessel {
     model: Assembly,
     around: u32,
-    /// Layers of the deposit, and of all.
+    /// Numbers of layers of the deposit, and of deposit and wall together.
     layers: [u32; 2],
     along: u32,
 }
@@ -201,7 +201,7 @@ impl Vessel {
 const HEX: [[u32; 3]; 8] =
     [[0, 0, 0], [0, 1, 0], [1, 1, 0], [1, 0, 0], [0, 0, 1], [0, 1, 1], [1, 1, 1], [1, 0, 1]];
 
-/// All triples of numbers below these, the last one first.
+/// Returns all triples of numbers below these; the last number varies first.
 fn triples([a, b, c]: [u32; 3]) -> impl Iterator<Item = (u32, u32, u32)> {
     (0..a * b * c).map(move |n| (n / (b * c), n / c % b, n % c))
 }
@@ -260,8 +260,8 @@ pub fn widened(divisions: Divisions, young: f64, radii: &[f64]) -> Result<Vec<Wi
     Ok(found)
 }
 
-/// The reference for a deposit of a Young's modulus [Pa]: radius of the inner surface at the throat [m], and
-/// displacements [m] and force [N] as in [`Widened`].
+/// Reads the reference for a deposit of a Young's modulus [Pa]. It has the radius of the inner surface at the
+/// throat [m], and displacements [m] and force [N] as in [`Widened`].
 pub fn exact(young: f64) -> Vec<Widened> {
     let data: Value = reference(include_str!("../../../validation/data/coupling/angioplasty.json"));
     let rows = data["rows"][format!("E_deposit_{young}")].as_array().cloned().unwrap_or_default();
@@ -310,8 +310,8 @@ fn compute() -> Result<Findings, CaseError> {
             findings.rows.push(Row::deviation(quantity, 0.05, (own / wanted - 1.0).abs(), SOURCE));
         }
     }
-    // The thesis's wall is a shell: as a thin one at the outside of the deposit it is stiffer than a thick
-    // one outside of it.
+    // The thesis's wall is a shell. A thin wall at the outside of the deposit is stiffer than a thick wall
+    // around the deposit.
     let thin = Divisions { through: [divisions.through[0], 0], ..divisions };
     for (own, radius) in widened(thin, DEPOSIT, &radii)?.iter().zip(&radii).skip(7) {
         let wanted = exact_at(&rows, own.inner);
@@ -366,7 +366,7 @@ mod tests {
     use super::*;
     use crate::largest;
 
-    /// Off by at most this part: displacements and force.
+    /// Largest relative deviation of displacements and force.
     fn off(divisions: Divisions, young: f64, radii: &[f64]) -> f64 {
         let rows = exact(young);
         let found = widened(divisions, young, radii).unwrap();

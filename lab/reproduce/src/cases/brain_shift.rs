@@ -1,5 +1,6 @@
-//! Brain shift on an ellipsoid: half axes 80, 65 and 60 mm about the origin, held by the skull below z = −12
-//! mm, pressed inwards at an opening around the axis n, free elsewhere. E = 3000 Pa, ν = 0.49.
+//! Brain shift on an ellipsoid with half axes of 80, 65 and 60 mm about the origin. The skull holds it below
+//! z = −12 mm. It is pressed inwards at an opening around the axis n, and free elsewhere. E = 3000 Pa, ν =
+//! 0.49.
 
 use pliant_geometry::{CellKind, DataArray, Locator, Mesh, Vector3, boundary, relative_acoustic_length};
 use pliant_mechanics::curve::{Curve as LoadCurve, Shape};
@@ -55,7 +56,7 @@ pub fn mesh() -> Mesh {
     stuffed(EDGE)
 }
 
-/// The same with tets of another edge [m].
+/// Returns the mesh of `scenes/brain-shift` with tets of another edge [m].
 ///
 /// # Panics
 /// If the edge is too large or too small to mesh the ellipsoid.
@@ -68,9 +69,9 @@ pub fn stuffed(edge: f64) -> Mesh {
     with_regions(mesh)
 }
 
-/// Moves surface nodes along the surface onto the border n·X = height [m]: of each edge of the surface that
-/// it cuts, the nearer end that spoils no tet around it (see [`WORST`]). On the unit sphere x/a, y/b, z/c the
-/// border is a circle.
+/// Moves surface nodes along the surface onto the border n·X = height [m]. For each surface edge that the
+/// border cuts, the nearer end moves that spoils no tet around it (see [`WORST`]). On the unit sphere x/a,
+/// y/b, z/c the border is a circle.
 fn draw_border(mesh: &mut Mesh, normal: &Vector3, height: f64) {
     let radii = Vector3::from(RADII);
     let axis = normal.component_mul(&radii);
@@ -106,13 +107,13 @@ fn draw_border(mesh: &mut Mesh, normal: &Vector3, height: f64) {
     }
 }
 
-/// 1 of a regular tet, 0 of a flat one, negative of an inverted one.
+/// Quality of a tet: 1 if regular, 0 if flat, negative if inverted.
 fn quality(mesh: &Mesh, tet: &[u32; 4]) -> f64 {
     relative_acoustic_length(CellKind::Tet, &tet.map(|node| mesh.points[node as usize]))
 }
 
-/// Adds the sets `skull` and `opening` of surface nodes and the point data `shift`, the displacement of the
-/// opening [m]: −10 mm s² (3 − 2s) n with s = (n·X/H − 0.88)/(1 − 0.88), where s ≥ 0.
+/// Adds the sets `skull` and `opening` of surface nodes, and the displacement of the opening [m] as point
+/// data `shift`. It is −10 mm s² (3 − 2s) n with s = (n·X/H − 0.88)/(1 − 0.88), where s ≥ 0.
 pub(crate) fn with_regions(mut mesh: Mesh) -> Mesh {
     let surface = boundary(&mesh).nodes();
     let s = |point: &Vector3| (point.dot(&Vector3::from(AXIS)) / HEIGHT - OPENING) / (1.0 - OPENING);

@@ -1,4 +1,4 @@
-//! Figure 6.7: the cost of fibres and relaxation on this machine: wall time of an explicit step of the
+//! Figure 6.7: the cost of fibres and relaxation on this machine. Wall time of an explicit step of the
 //! thesis's cube of hexahedra, single precision, all cores. Repeats of all models are interleaved, so other
 //! load affects them equally; the median counts.
 
@@ -20,12 +20,12 @@ use crate::{Specimen, elastic, law, liver, liver_matrix, liver_relaxation};
 const CELLS: [usize; 4] = [10, 16, 25, 38];
 /// Repeats of every model.
 const REPEATS: usize = 21;
-/// The same on a GPU.
+/// Repeats of every model on a GPU.
 const REPEATS_ON_DEVICE: usize = 5;
 /// Elements stepped in a repeat.
 const ELEMENT_STEPS: usize = 110_000;
 /// Names of the models, as in the thesis: neo-Hookean elastic, transversely isotropic elastic and
-/// viscoelastic; and neo-Hookean viscoelastic, which it has not.
+/// viscoelastic; and neo-Hookean viscoelastic, which is not in the thesis.
 const MODELS: [&str; 4] = ["NHE", "TIE", "NHV", "TIV"];
 
 /// Figure 6.7.
@@ -62,7 +62,7 @@ fn materials() -> [Material; 4] {
     .map(|(law, prony)| Material { law, prony, density: 1000.0 })
 }
 
-/// Wall times of a step [s] of each model, repeat by repeat, all by steps of the stiffest.
+/// Wall times of a step [s] of each model, repeat by repeat. All take the step of the stiffest model.
 fn measure(cells: usize, device: Option<&Device>) -> Result<Vec<[f64; 4]>, CaseError> {
     let cubes = materials().map(|material| cube(cells, &material));
     let step = cubes.iter().map(|cube| 0.9 * cube.element_bound()).fold(f64::INFINITY, f64::min);
@@ -111,7 +111,7 @@ struct Series {
     place: &'static str,
     /// … and which one it is here.
     detail: String,
-    /// Of each mesh.
+    /// Times of each mesh: for each repeat, one time per model.
     times: Vec<Vec<[f64; 4]>>,
 }
 
@@ -127,7 +127,7 @@ impl Series {
         CELLS.into_iter().zip(&self.times).map(median).collect()
     }
 
-    /// Times of the models, and ratios of them.
+    /// Adds times of the models, and their ratios.
     fn add_figures(&self, findings: &mut Findings) -> Result<(), CaseError> {
         let mut curves = Vec::new();
         for (model, name) in MODELS.into_iter().enumerate() {

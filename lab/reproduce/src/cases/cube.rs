@@ -42,8 +42,8 @@ pub(crate) const DEFORMED: Case = Case {
     compute,
 };
 
-/// An eighth [0, 0.05 m]³ of the cube with its glued platen at x = 0 moving inwards by a part of its edge,
-/// and its symmetry planes at x = 0.05, y = 0 and z = 0.
+/// Constrains an eighth [0, 0.05 m]³ of the cube. Its glued platen at x = 0 moves inwards by a part of its
+/// edge. Its symmetry planes are x = 0.05, y = 0 and z = 0.
 pub(crate) fn held_as_an_eighth(specimen: Specimen, part: f64, curve: Curve) -> Specimen {
     specimen
         .shift("x-min", part * 0.05, curve)

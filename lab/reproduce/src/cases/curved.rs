@@ -1,7 +1,7 @@
 //! Figures 8.2 to 8.4: the curved surface of shells, its carried surfaces, and its rendering. The surface
 //! here is a cubic Bézier triangle from positions and nodal normals (PN triangles of Vlachos et al. 2001 with
-//! arcs for edges), not the thesis's deflection (8.3) along the normal of each facet, which leaves gaps
-//! between facets that are not coplanar.
+//! arcs for edges). The thesis's deflection (8.3) along the normal of each facet leaves gaps between facets
+//! that are not coplanar.
 
 use nalgebra::{SMatrix, SVector, UnitQuaternion};
 use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3};
@@ -97,7 +97,7 @@ fn polynomial([x, y]: [f64; 2]) -> [[f64; 9]; 3] {
 struct Deflected {
     corners: [Vector3; 3],
     axes: [Vector3; 3],
-    /// In the axes, from the first corner.
+    /// Corners in the facet's axes, from the first corner.
     local: [[f64; 2]; 3],
     /// (8.4) with the corrected (8.5).
     inverse: SMatrix<f64, 9, 9>,
@@ -105,7 +105,7 @@ struct Deflected {
 }
 
 impl Deflected {
-    /// Of corners and the normals there.
+    /// Makes the deflected facet of corners and their normals.
     fn new(corners: [Vector3; 3], normals: [Vector3; 3]) -> Self {
         let [a, b, c] = corners;
         let first = (b - a).normalize();
@@ -145,7 +145,7 @@ impl Deflected {
     }
 }
 
-/// Errors of force and moment of the nodal loads against those of a force at a point, over the force and over
+/// Errors of force and moment of the nodal loads compared with a force at a point, over the force and over
 /// force × mean edge.
 fn resultants_off(
     corners: [Vector3; 3],
@@ -333,7 +333,7 @@ fn layers() -> Result<Findings, CaseError> {
     Ok(findings)
 }
 
-/// A sphere of shells under an affine motion of its nodes; the normals rotate with those of the ellipsoid.
+/// A sphere of shells under an affine motion of its nodes; the normals rotate with the ellipsoid's normals.
 struct Ellipsoid {
     model: Assembly,
     state: State,
@@ -361,7 +361,7 @@ impl Ellipsoid {
         (0.5 * (scaled.norm_squared() - 1.0) / scaled.component_div(&self.axes).norm()).abs()
     }
 
-    /// Diagonal of the box round the ellipsoid.
+    /// Diagonal of the box around the ellipsoid.
     fn diagonal(&self) -> f64 {
         2.0 * self.axes.norm()
     }
@@ -403,8 +403,8 @@ impl Ellipsoid {
     }
 }
 
-/// How far the surfaces of a sphere of so many shells are off: the one here, and the thesis's at its gaps,
-/// with the largest distance, the mean one and the gap of a prototype.
+/// Distances of the surfaces of a sphere of `count` shells from the true sphere. References are the largest
+/// and the rms distance of this surface, and the gap of the thesis's surface, all from a prototype.
 fn distances(levels: u32, count: u32, ours: [f64; 2], theirs: f64) -> Result<[Row; 3], CaseError> {
     let source = "prototype of the formulas; tolerance 10 %";
     let ball = Ellipsoid::new(levels, [1.0; 3])?;
@@ -429,7 +429,7 @@ fn distances(levels: u32, count: u32, ours: [f64; 2], theirs: f64) -> Result<[Ro
     Ok([most, mean, Row { reference: Some(theirs), ..gap }])
 }
 
-/// The thesis's surface: each facet by itself, as gaps part them.
+/// The thesis's surface: each facet by itself, since gaps separate the facets.
 fn with_gaps(ball: &Ellipsoid, Picture { places, triangles, .. }: &Picture) -> Mesh {
     let (mut points, mut cut) = (Vec::new(), Vec::new());
     for facet in 0..ball.model.facets.len() {
@@ -449,8 +449,8 @@ fn with_gaps(ball: &Ellipsoid, Picture { places, triangles, .. }: &Picture) -> M
     triangle_mesh(points, cut)
 }
 
-/// A sphere of 1,280 triangles that shells carry from rest to where they are now, rotated so that no part of
-/// it lies on their edges.
+/// Returns a sphere of 1,280 triangles that the shells carry from rest to their current state. It is rotated
+/// so that no part lies on the edges of the shells.
 fn irregular(rest: &Ellipsoid, ball: &Ellipsoid, surface: &CurvedSurface) -> Result<Mesh, CaseError> {
     let mut irregular = sphere(1.0, 3, DEFAULT_CELL_LIMIT)?;
     let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.3, 0.5, -0.2));
@@ -502,7 +502,8 @@ fn rendering() -> Result<Findings, CaseError> {
     Ok(findings)
 }
 
-/// The area coordinates of a place in a facet that it belongs to; places on edges belong to both.
+/// The area coordinates of a place in a facet, if it belongs to the facet; places on edges belong to both
+/// facets.
 fn weights_in(model: &Assembly, place: &Place, facet: usize) -> Option<[f64; 3]> {
     let (own, nodes) = (model.facets[place.facet as usize].nodes, model.facets[facet].nodes);
     let weighed = own.iter().zip(place.weights).filter(|(_, w)| *w > 0.0);

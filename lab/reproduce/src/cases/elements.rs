@@ -21,13 +21,13 @@ pub const TIP: [f64; 2] = [-34.85, 0.15];
 /// F [N] of the cube in the limit of fine meshes, and its uncertainty.
 pub const FORCE: [f64; 2] = [9.15, 0.15];
 
-/// An element of the study: its name, what tets and hexes become, and whether the mesh is of hexes.
+/// An element of the study: its name and the elements of tets and hexes. With `hexes` the mesh is of hexes.
 #[derive(Clone, Copy, Debug)]
 pub struct Element {
     /// Its name in a scene.
     pub name: &'static str,
     tets: Tets,
-    /// Of the cantilever and of the cube.
+    /// Hexes of the cantilever and of the cube.
     hexes: Option<[Hexes; 2]>,
 }
 

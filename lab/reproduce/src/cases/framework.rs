@@ -1,7 +1,7 @@
 //! Figure 6.9: the cost of the framework. The bare step of a cube of hexahedra under gravity is compared with
-//! the whole program on this machine, without and with a series of meshes, in single precision on all cores;
-//! so is `scenes/liver`, without and with all its outputs. All start at rest and take the same steps of the
-//! same model; repeats are interleaved, so other load affects all equally.
+//! the whole program, without and with a series of meshes. `scenes/liver` is compared likewise, without and
+//! with all its outputs. Everything runs on this machine, in single precision on all cores. All start at rest
+//! and take the same steps of the same model; repeats are interleaved, so other load affects all equally.
 
 use pliant_bench::{Clocked, Spread, Timed};
 use pliant_explicit::State;
@@ -19,7 +19,7 @@ use crate::plot::{Curve, Key, Pen, Plot};
 const CELLS: [usize; 5] = [10, 15, 20, 25, 30];
 /// Repeats of both.
 const REPEATS: usize = 3;
-/// Steps in a repeat: as many as a run takes for each critical time step that it finds anew.
+/// Steps in a repeat: as many as a run takes between computations of the critical time step.
 const STEPS: u64 = 1000;
 
 /// Figure 6.9.
@@ -37,7 +37,7 @@ pub(crate) const CASE: Case = Case {
     compute,
 };
 
-/// The cube with so many elements along its edge, for so many seconds.
+/// Scene of the cube with `cells` elements along its edge, until a time [s].
 fn scene(cells: usize, until: f64, series: &str) -> Result<Scene, CaseError> {
     let text = format!(
         "[scene]\nuntil = {until:?}\ngravity = [0, 0, -9.81]\n[run]\nprecision = \"single\"\n[law.tissue]\n\
@@ -66,7 +66,7 @@ impl Program {
         Ok(Self([World::new(&scene(cells, until, "")?)?, World::new(&scene(cells, until, SERIES)?)?]))
     }
 
-    /// The liver's, over the first second.
+    /// Program of the liver, over the first second.
     fn of_liver() -> Result<Self, CaseError> {
         let mut scene = super::liver::scene()?;
         scene.scene.until = 1.0;
@@ -89,8 +89,8 @@ impl Program {
         Ok([self.bare()?, whole(&self.0[0])?, whole(&self.0[1])?])
     }
 
-    /// Medians of the repeats' three times [s], and of their costs over the first [%]. A turn before warms
-    /// up.
+    /// Medians of the repeats' three times [s], and of their costs over the first [%]. A turn before the
+    /// repeats warms up.
     fn medians(&self) -> Result<([f64; 3], [f64; 2]), CaseError> {
         self.times()?;
         let times = (0..REPEATS).map(|_| self.times()).collect::<Result<Vec<_>, _>>()?;

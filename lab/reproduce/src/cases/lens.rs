@@ -1,5 +1,5 @@
 //! Table 8.2 and figures 8.6 to 8.8: an intra-ocular lens is folded, pushed through an injector and unfolds
-//! in a bag. The run is that of `scenes/lens`: the thesis gives neither its meshes nor its injector.
+//! in a bag. The case runs `scenes/lens`: the thesis gives neither its meshes nor its injector.
 
 use std::fs;
 use std::time::Instant;
@@ -46,7 +46,7 @@ const MASS: f64 = 14.754_206_3e-6;
 /// Ends [s] of folding and of the way of the plunger.
 const FOLDED: f64 = 2.0;
 const PUSHED: f64 = 4.14;
-/// Where the tube ends, along y [m].
+/// End of the tube along y [m].
 const TUBE_END: f64 = 30e-3;
 /// Time [s] from the exit of the lens to the measurement of its shape.
 const REST: f64 = 2.0;
@@ -117,10 +117,10 @@ fn mesh() -> Result<Findings, CaseError> {
 struct Way {
     mesh: Mesh,
     rest: Vec<f64>,
-    /// When [s] all of it was beyond the tube.
+    /// Time [s] when the whole lens was beyond the tube.
     left: Option<f64>,
-    /// The largest change of its whole area, and of that of a triangle; the largest part of it in triangles
-    /// that changed by more than 5 %.
+    /// The largest change of its whole area, and of the area of a triangle. Last, the largest part of the
+    /// area in triangles that changed by more than 5 %.
     whole: f64,
     triangle: f64,
     beyond: f64,
@@ -146,14 +146,15 @@ impl Way {
         }
     }
 
-    /// The lens as it is, about its middle.
+    /// Current shape of the lens, about its middle.
     fn shape(&self, frame: &Frame<'_>) -> Mesh {
         let points = self.points(frame);
         let middle = points.iter().sum::<Vector3>() / points.len() as f64;
         Mesh { points: points.into_iter().map(|x| x - middle).collect(), ..self.mesh.clone() }
     }
 
-    /// The least and the largest diameter of the optic over that at rest, between opposite nodes of its rim.
+    /// The least and the largest diameter of the optic over its diameter at rest, between opposite nodes of
+    /// its rim.
     fn diameters(&self, frame: &Frame<'_>) -> [f64; 2] {
         let points = self.points(frame);
         let rest = &self.mesh.points;

@@ -1,9 +1,9 @@
 //! Figure 6.10: von Mises stress in a stretched liver, transversely isotropic, without relaxation and with it
-//! some seconds after the stretch. The organ is the one of `scenes/liver`, since the thesis's mesh was never
+//! some seconds after the stretch. The organ is from `scenes/liver`, since the thesis's mesh was never
 //! published.
 //!
-//! The source has no numbers. Instead: after relaxation, the tissue must equal an elastic one of modulus (1 −
-//! α) μ, (1 − α) η and the same κ in equilibrium, which another solver computes.
+//! The source has no numbers. Instead, another solver computes an elastic equilibrium with the moduli (1 − α)
+//! μ and (1 − α) η and the same κ. After relaxation, the tissue must equal it.
 
 use pliant_format::Scene;
 use pliant_format::source::Source;
@@ -107,7 +107,7 @@ fn compute() -> Result<Findings, CaseError> {
         let all: f64 = (0..cells.len()).map(volume).sum();
         stress.iter().enumerate().map(|(cell, s)| volume(cell) * s).sum::<f64>() / all
     };
-    // 1 %: three seconds after the pull e^(−3/0.58) = 0.6 % of what relaxes is left.
+    // 1 %: three seconds after the pull e^(−3/0.58) = 0.6 % of the relaxing stress is left.
     let source = "elastic equilibrium with half of μ and η, by dynamic relaxation";
     let most = |stretched: &Stretched| largest(stretched.stress.iter().copied());
     let told = |stretched: &Stretched| [most(stretched), mean(&stretched.stress), stretched.force];

@@ -21,7 +21,7 @@ use pliant_gpu::{Adapter, Kind};
 
 use crate::case::{Case, Correction};
 
-/// All cases.
+/// List of all cases.
 pub const CASES: &[Case] = &[
     shear::ELASTIC,
     shear::VISCOELASTIC,

@@ -1,6 +1,6 @@
 //! The obstacle course of linear shell elements (MacNeal and Harder 1985; Belytschko et al. 1985; Cook), with
 //! the project's element and the thesis's. Each number, including the references from a prototype of the same
-//! formulas, is a displacement over that of the literature.
+//! formulas, is a displacement over the literature's.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -101,7 +101,7 @@ pub fn cook(cells: usize, formulation: Formulation) -> Result<f64, CaseError> {
     Ok(cook.linear(middle)?[1] / 23.96)
 }
 
-/// How the six cells of the cantilever are shaped.
+/// Shape of the six cells of the cantilever.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CantileverCells {
     /// Squares.
@@ -112,8 +112,8 @@ pub enum CantileverCells {
     Parallelograms,
 }
 
-/// MacNeal and Harder's slender cantilever of 6 × 1 cells: its tip under a unit force in the plane over
-/// 0.1081, and out of it over 0.4321.
+/// Solves MacNeal and Harder's slender cantilever of 6 × 1 cells. Returns its tip displacement under a unit
+/// force in the plane over 0.1081, and out of the plane over 0.4321.
 ///
 /// # Errors
 /// If the stiffness is singular.
@@ -140,8 +140,8 @@ pub fn cantilever(cells: CantileverCells, formulation: Formulation) -> Result<[f
     Ok([tip(1, 0.1081)?, tip(2, 0.4321)?])
 }
 
-/// MacNeal and Harder's twisted beam with `across` cells over its width: tip displacement in the plane of the
-/// load and out of it, over those of the literature.
+/// Solves MacNeal and Harder's twisted beam with `across` cells over its width. Returns its tip displacements
+/// under loads in the plane and out of the plane, over the literature's.
 ///
 /// # Errors
 /// If the stiffness is singular.
@@ -179,7 +179,7 @@ struct Problem {
     /// The ratio, in words.
     displacement: &'static str,
     cells: &'static [usize],
-    /// Of the prototype: ours and the thesis's element.
+    /// Ratios of the prototype, with this project's element and the thesis's.
     prototype: [&'static [f64]; 2],
     tolerance: f64,
     solve: fn(usize, Formulation) -> Result<f64, CaseError>,

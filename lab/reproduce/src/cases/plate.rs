@@ -24,7 +24,8 @@ pub const RIGIDITY: f64 = 100.0;
 const LINEAR: f64 = 0.126532;
 /// Table 8.1, [m] at 1 to 5 Pa.
 const PRINTED: [f64; 5] = [0.1218, 0.2475, 0.3747, 0.5050, 0.6374];
-/// The same with large deflections, found by the prototype of the formulas on a quarter of 16 × 16 cells.
+/// Centre deflections [m] at 1 to 5 Pa by large-deflection theory, from the prototype of the formulas on a
+/// quarter of 16 × 16 cells.
 pub const LARGE: [f64; 5] = [0.0890, 0.1310, 0.1588, 0.1801, 0.1977];
 
 /// Table 8.1.
@@ -88,11 +89,11 @@ pub fn clamped(mesh: Mesh, formulation: Formulation) -> Result<f64, CaseError> {
     Ok(plate.linear(centre)?[2] * RIGIDITY / (0.00126532 * SIDE.powi(4)))
 }
 
-/// Deflections [m] in the middle under loads [Pa] one after the other, up to 5 Pa: equilibria with large
-/// rotations, no edge moving in its plane. A quarter of 16 × 16 cells.
+/// Computes the deflections [m] in the middle under loads [Pa] one after the other, up to 5 Pa. They are
+/// equilibria with large rotations of a quarter of 16 × 16 cells, whose edges do not move in their plane.
 ///
 /// # Errors
-/// If one is not found.
+/// If an equilibrium is not found.
 pub fn deflections(loads: &[f64]) -> Result<Vec<f64>, CaseError> {
     let quarter = sheet(Sheet::Plate { size: [0.5 * SIDE; 2] }, [16; 2], Pattern::UnionJack)?;
     let plate = Specimen::new(quarter, ELASTIC, THICKNESS, Formulation::default())?
@@ -109,12 +110,12 @@ pub fn deflections(loads: &[f64]) -> Result<Vec<f64>, CaseError> {
     let mut found = Vec::new();
     let at_centre = |frame: &Frame<'_>| frame.parts().map(|(_, now)| now.displacement(centre)[2]).next();
     Simulation::new(World::new(vec![part]))?.run(until, |frame| found.extend(at_centre(frame)))?;
-    // The first instant is that at rest.
+    // The first instant is at rest.
     Ok(found.split_off(1))
 }
 
-/// The deflection at 1 Pa [m] of the thesis's element alone in bending on 9 × 9 nodes, with the whole load
-/// shared alike by all nodes, clamped ones too.
+/// Computes the deflection at 1 Pa [m] of the thesis's bending element, without membrane, on 9 × 9 nodes. All
+/// nodes, clamped ones too, share the whole load equally.
 fn as_in_the_thesis() -> Result<f64, CaseError> {
     let bending = Formulation { membrane: Membrane::None, bending: Bending::Comas2010 };
     let mesh = mesh(8, Pattern::Diagonal)?;

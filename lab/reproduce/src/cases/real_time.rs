@@ -1,5 +1,6 @@
 //! Figure 6.8: tissue in real time. A cube of 55,566 tetrahedra is stretched to and fro, and a liver is
-//! pulled on one thread, as `pliant view` plays them: steps, and sixty frames per second of simulated time.
+//! pulled, on one thread. As in `pliant view`, steps are taken, and sixty frames made per second of simulated
+//! time.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -37,11 +38,11 @@ const FRAMES: f64 = 60.0;
 /// Time of the largest stretch [s].
 const FARTHEST: f64 = 0.5;
 
-/// What playing a scene took.
+/// Cost of playing a scene.
 struct Played {
     elements: usize,
     step: f64,
-    /// Wall times of all steps and of all frames [s].
+    /// Wall time of all steps and of all frames [s].
     stepping: f64,
     preparing: f64,
     frames: u64,

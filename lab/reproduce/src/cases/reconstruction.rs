@@ -1,7 +1,7 @@
 //! Figures 9.1 to 9.3: fine surfaces as few curved shells. The thesis prints no numbers beside its maps of
 //! the distance from shells to surface; here both directions are measured, densely. The capsule and the
 //! aneurysm are analytic, since the thesis's are not published. If `PLIANT_DATA` names a folder of organs,
-//! those of patients are shown as well.
+//! organs of patients are shown as well.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -98,7 +98,8 @@ impl Study<'_> {
         rows
     }
 
-    /// A body by a number of shells: its rows, and a picture of the target, the shells and the distances.
+    /// Fits a body by a number of shells: adds its rows, and a picture of the target, the shells and the
+    /// distances.
     fn by_shells(&self, shells: usize, from: [f64; 3], findings: &mut Findings) -> Result<(), CaseError> {
         let start = Instant::now();
         let fitted = FittedShells::new(self.target, ShellGoal::Shells(shells), &|_| {})?;

@@ -1,6 +1,6 @@
 //! Figure 6.6: the liver-like cube compressed by 30 % in 0.5 s, linearly, then held to 5 s. Half of the
 //! isochoric stress relaxes with τ = 0.58 s. The reference is quasi-static, of quadratic hexahedra without
-//! inertia, so the comparison uses the shape of the decay, F(t)/F(5 s), after the waves of the ramp.
+//! inertia. The comparison therefore uses the shape of the decay, F(t)/F(5 s), after the waves of the ramp.
 
 use pliant_mechanics::curve::{Curve as LoadCurve, Shape};
 use pliant_mechanics::law::AnyLaw;
@@ -80,7 +80,7 @@ fn force_at(times: &[f64], (part, factor): (Specimen, f64)) -> Result<Vec<f64>, 
     Ok(forces)
 }
 
-/// How a cube relaxes beside a reference curve.
+/// Relaxation of a cube compared with a reference curve.
 #[derive(Clone, Debug)]
 pub struct Relaxed {
     /// Times [s].
@@ -126,8 +126,8 @@ fn from_rest(times: &[f64], forces: &[f64]) -> Vec<(f64, f64)> {
     std::iter::once((0.0, 0.0)).chain(times.iter().copied().zip(forces.iter().copied())).collect()
 }
 
-/// The limit of fine meshes and its uncertainty, from a force of the reference: at 30 % its coarse meshes of
-/// quadratic hexahedra are 4 to 8 % too stiff.
+/// Returns the limit of fine meshes and its uncertainty, from a force of the reference. At 30 % the
+/// reference's coarse meshes of quadratic hexahedra are 4 to 8 % too stiff.
 pub fn of_fine_meshes(force: f64) -> [f64; 2] {
     let [low, high] = [force / 1.08, force / 1.04];
     [0.5 * (low + high), 0.5 * (high - low)]

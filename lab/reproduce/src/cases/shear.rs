@@ -82,8 +82,8 @@ pub fn data() -> Value {
     reference(include_str!("../../../validation/data/shear_curves.json"))
 }
 
-/// The curves of a geometry (`A` or `B`), a kind of fibres (`energy`, `taylor` or `isotropic`) and a rate
-/// (`instantaneous`, `equilibrium` or as in [`rate_name`]), component by component [Pa].
+/// Returns the curves [Pa] component by component. A geometry is `A` or `B`, a kind of fibres `energy`,
+/// `taylor` or `isotropic`, and a rate `instantaneous`, `equilibrium` or as in [`rate_name`].
 pub fn curves(data: &Value, geometry: &str, fibres: &str, rate: &str) -> [Vec<f64>; 4] {
     COMPONENTS.map(|component| numbers(&data[geometry][fibres][rate][component]))
 }
@@ -109,7 +109,8 @@ pub fn deviation(curves: &[Vec<f64>; 4], stresses: &[Symmetric<f64>]) -> f64 {
     largest((0..4).map(|component| off(&curves[component], stresses, component)))
 }
 
-/// The same for one component; infinite if the numbers of stresses and values differ.
+/// The largest deviation of one component from its curve; infinite if the numbers of stresses and values
+/// differ.
 fn off(curve: &[f64], stresses: &[Symmetric<f64>], component: usize) -> f64 {
     if curve.len() != stresses.len() {
         return f64::INFINITY;
@@ -118,7 +119,7 @@ fn off(curve: &[f64], stresses: &[Symmetric<f64>], component: usize) -> f64 {
     largest(off) / largest(curve.iter().map(|s| s.abs()))
 }
 
-/// How fast an element is sheared.
+/// Rate at which an element is sheared.
 #[derive(Clone, Copy, Debug)]
 enum Rate {
     /// At a rate [1/s], with steps of [`STEP`].

@@ -19,24 +19,25 @@ use super::{
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct MeshTable {
     /// A mesh file, relative to the scene: Gmsh (.msh), VTK (.vtk, .vtu), OBJ, OFF, STL, PLY, GIfTI,
-    /// FreeSurfer. Its own cells are taken, unless `as` asks for others made of its surface.
+    /// FreeSurfer. Its own cells are used, unless `as` asks for new cells from its surface.
     #[serde(default)]
     pub file: Option<PathBuf>,
-    /// The name of a mesh that the program which reads the scene gives from its memory, instead of a `file`;
-    /// scenes that the command line reads have none.
+    /// Name of a mesh in the memory of the program that reads the scene, instead of a `file`. Not available
+    /// on the command line.
     #[serde(default)]
     pub given: Option<String>,
     /// A segmented image, relative to the scene: NIfTI (.nii, .nii.gz), NRRD, MetaImage (.mha, .mhd), GIPL, a
-    /// DICOM segmentation, or the folder of a DICOM series. Coordinates are those of the patient: x to the
-    /// right, y to the front, z to the head [m].
+    /// DICOM segmentation, or the folder of a DICOM series. Coordinates are the patient's: x to the right, y
+    /// to the front, z to the head [m].
     #[serde(default)]
     pub image: Option<PathBuf>,
-    /// Another image of the same voxels whose values are added before the `threshold`, as grey matter to
-    /// white matter.
+    /// Another image of the same voxels; its values are added before the `threshold`, as grey matter to white
+    /// matter.
     #[serde(default)]
     pub add: Option<PathBuf>,
-    /// Several masks of the same voxels, each an image with 0 outside, as one image: the first has label 1,
-    /// the second 2, and so on, each with the name of its file. Where they overlap, the last one counts.
+    /// Several masks of the same voxels as one image; each mask is an image with 0 outside. The first mask
+    /// has label 1, the second 2, and so on; each label has the name of its file. Where masks overlap, the
+    /// last one counts.
     #[serde(default)]
     pub masks: Option<Vec<PathBuf>>,
     /// Names for the labels: a table of ITK-SNAP, FreeSurfer or 3D Slicer, lines like `5 liver`, JSON, or the
@@ -53,17 +54,16 @@ pub struct MeshTable {
     /// first label takes what cleaning adds.
     #[serde(default)]
     pub labels: Option<Vec<Label>>,
-    /// Labels of vessels in the organ of `label` or `labels`, by number, name or range. Where they run inside
-    /// of the organ, their voxels belong to it, with the label of the tissue round them; outside of it they
-    /// do not. A voxel is inside if more than half of the 26 ways from it lead through vessels into the
-    /// organ.
+    /// Labels of vessels in the organ of `label` or `labels`, by number, name or range. Vessel voxels inside
+    /// the organ belong to the organ, with the label of the tissue around them. Vessel voxels outside do not.
+    /// A voxel is inside if more than half of the 26 directions from it lead through vessels into the organ.
     #[serde(default)]
     pub vessels: Option<Vec<Label>>,
     /// Instead of labels: all voxels of at least this value, as of a map of probabilities. Their label is 1.
     #[serde(default)]
     pub threshold: Option<f64>,
-    /// Cleaning of the labels of an image, or of what the surface of a file encloses, before new cells are
-    /// made.
+    /// Cleaning of the labels of an image, or of the volume inside the surface of a file, before new cells
+    /// are made.
     #[serde(default)]
     pub clean: Option<CleanTable>,
     /// A box from the origin.
@@ -108,13 +108,13 @@ pub struct MeshTable {
     /// have a point in common; with `edge` each piece is cut into bars of about that length.
     #[serde(default)]
     pub lines: Option<Vec<Vec<[f64; 3]>>>,
-    /// Target edge length of the cells of a built-in shape, an image or what the surface of a file encloses
-    /// [m].
+    /// Target edge length [m] of the cells of a built-in shape, an image or the volume inside the surface of
+    /// a file.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub edge: Option<f64>,
-    /// Tets of an image or of what the surface of a file encloses: longer edge inside, away from the surface
-    /// [m], rounded down to 2, 4, 8, ... times `edge`.
+    /// Longer edge of tets inside, away from the surface [m], rounded down to 2, 4, 8, ... times `edge`. For
+    /// tets of an image, or of the volume inside the surface of a file.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub inner_edge: Option<f64>,
@@ -122,13 +122,13 @@ pub struct MeshTable {
     /// `["tumour", { label = 5, edge = 0.002 }]`. Edges are rounded down to a half, a quarter, ... of `edge`.
     #[serde(default)]
     pub protect: Option<Vec<Protected>>,
-    /// Largest distance between the boundary of tets and the body [m], both ways: they are made smaller where
-    /// it is not held. It is measured to the triangles of a file, or to the smooth surface of an image.
-    /// Without `edge` the first edge is chosen.
+    /// Largest distance between the boundary of tets and the body [m], both ways. Tets are made smaller where
+    /// they exceed it. The distance is measured to the triangles of a file, or to the smooth surface of an
+    /// image. Without `edge` the first edge is chosen automatically.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub distance: Option<f64>,
-    /// Number of triangles of a `surface` of an image or a file, instead of `edge`: as few, placed where the
+    /// Number of triangles of a `surface` of an image or a file, instead of `edge`. They are placed where the
     /// shape needs them.
     #[serde(default)]
     #[schemars(range(min = 4))]
@@ -195,7 +195,7 @@ pub enum Label {
 }
 
 impl Label {
-    /// What of an image it stands for.
+    /// Labels of an image that it stands for.
     pub fn choice(&self) -> LabelChoice {
         match self {
             Self::Number(label) => LabelChoice::One(*label),
@@ -217,7 +217,7 @@ pub enum LabelOrGroups {
     Groups(BTreeMap<String, LabelGroup>),
 }
 
-/// Labels that become one: a label or a range, or several of them.
+/// Labels that become one: a label, a range, or a list of labels and ranges.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum LabelGroup {
@@ -228,7 +228,7 @@ pub enum LabelGroup {
 }
 
 impl LabelOrGroups {
-    /// What of an image it stands for.
+    /// Labels or groups of labels of an image that it stands for.
     pub fn choices(&self) -> Vec<LabelChoice> {
         let group = |(name, group): (&String, &LabelGroup)| {
             let labels = match group {
@@ -283,10 +283,10 @@ pub struct CleanTable {
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub close_gaps: f64,
-    /// Whether to fill cavities without a way out.
+    /// True to fill cavities without a way out.
     #[serde(default)]
     pub fill_holes: bool,
-    /// Whether to keep only the largest piece.
+    /// True to keep only the largest piece.
     #[serde(default)]
     pub keep_largest: bool,
 }
@@ -333,11 +333,11 @@ pub enum Cells {
     /// Hexahedra: structured for blocks and tubes, cubes with a stepped surface for ellipsoids, organs and
     /// images.
     Hexes,
-    /// All cubes that an ellipsoid, an organ or an image fills by more than 2 %, with their stiffness and
-    /// mass by the part that it fills. A carried surface shows it smooth.
+    /// Cubes that an ellipsoid, an organ or an image fills by more than 2 %. The filled part of a cube scales
+    /// its stiffness and mass. A carried surface shows the body smooth.
     ImmersedHexes,
-    /// The smooth surface of an image in triangles: even ones of `edge`, as few as `triangles`, or for a
-    /// carried surface as fine as the voxels.
+    /// The smooth surface of an image in triangles: even triangles of `edge`, or as few as `triangles`. For a
+    /// carried surface they may be as fine as the voxels.
     Surface,
     /// Curved shells fitted to the smooth surface of an image: as many as `shells`, or as close as `error`.
     Shells,

@@ -20,22 +20,23 @@ use super::{NodeVectors, Rotations};
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct BodyTable {
-    /// How it is modelled; if not given, `solid`, or `membrane` with `on`. With the solvers `explicit` and
+    /// Model of the body; if not given, `solid`, or `membrane` with `on`. With the solvers `explicit` and
     /// `quasi-static` shells are a participant of their own (`[participant.NAME]`).
     #[serde(default)]
     pub model: BodyModel,
     /// Its mesh, from a file, a built-in shape, or a segmented image. The mesh of a shell or a membrane is of
-    /// triangles (quads are cut into two); a volume mesh gives it its boundary. That of bars is of lines.
+    /// triangles (quads are cut into two); of a volume mesh it takes the boundary. The mesh of bars is of
+    /// lines.
     #[serde(default)]
     pub mesh: MeshTable,
     /// Instead of a mesh: the body on whose boundary this one is a wall, with the same nodes, as the capsule
     /// of an organ.
     #[serde(default)]
     pub on: Option<String>,
-    /// The faces of that boundary that are the wall; if not given, all of it.
+    /// The faces of that boundary that are the wall; if not given, all faces.
     #[serde(default)]
     pub faces: Option<Selection>,
-    /// What the rotations of a shell do that is a wall with `on`.
+    /// Behaviour of the rotations of a shell that is a wall with `on`.
     #[serde(default)]
     pub rotations: Rotations,
     /// The element; if not given, `tet4` for tets, `hex8` for hexes and `dkt-curved` for shells;
@@ -47,8 +48,8 @@ pub struct BodyTable {
     /// strain; a shell whose `layers` all have their own elasticity needs none.
     #[serde(default = "no_law")]
     pub law: ByLabel<String>,
-    /// Mass per volume [kg/m³], or one for each cell label, as of `law`. Elements with averaged pressure
-    /// average it apart on parts of different density.
+    /// Mass per volume [kg/m³], or one for each cell label, as for `law`. Elements with averaged pressure
+    /// average it separately on parts of different density.
     pub density: ByLabel<Density>,
     /// Thickness of a shell or a membrane [m]: one, or one for each triangle.
     #[serde(default)]
@@ -57,13 +58,13 @@ pub struct BodyTable {
     /// of a `thickness`. Their angles count from `fibre`, projected on each triangle.
     #[serde(default)]
     pub layers: Vec<LayerTable>,
-    /// Tension [N/m] of a shell in the shape of its mesh, equal in all directions: what holds a flat
-    /// `membrane` across. Not for the element `plate`.
+    /// Tension [N/m] of a shell in the shape of its mesh, equal in all directions: it holds a flat `membrane`
+    /// across its plane. Not for the element `plate`.
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub pre_tension: f64,
-    /// Where the normals at rest of a shell come from, which make its surface curved; if not given, from the
-    /// mesh where it has some, as built-in shapes have, and there is no `crease`, else from the triangles.
+    /// Source of the normals at rest of a shell, which make its surface curved. If not given, the mesh, if it
+    /// has normals (built-in shapes have) and there is no `crease`; else the triangles.
     #[serde(default)]
     pub normals: Option<Normals>,
     /// Angle [degrees] between triangles of a shell above which their edge is a crease, where the curved
@@ -71,11 +72,11 @@ pub struct BodyTable {
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 180.0))]
     pub crease: Option<f64>,
-    /// Whether more than two triangles of a shell may meet in an edge.
+    /// True if more than two triangles of a shell may meet in an edge.
     #[serde(default)]
     pub branches: bool,
-    /// The name of a cell-data array of the mesh with the part of each cell that the body fills, above 0 and
-    /// at most 1: its stiffness and mass are so much smaller, but never less than a tenth. If not given,
+    /// Name of a cell-data array of the mesh with the part of each cell that the body fills, above 0 and at
+    /// most 1. The part scales the stiffness and mass of the cell, but never below a tenth. If not given,
     /// `fraction` of `immersed-hexes`.
     #[serde(default)]
     pub fraction: Option<String>,
@@ -83,12 +84,12 @@ pub struct BodyTable {
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub area: Option<f64>,
-    /// Length of bars without force over that in the mesh: above 1 they hang through at the start, below 1
-    /// they pull.
+    /// Length of bars without force over their length in the mesh: above 1 they are slack at the start, below
+    /// 1 they pull.
     #[serde(default = "one")]
     #[schemars(range(min = 0.1, max = 10.0))]
     pub slack: f64,
-    /// Whether bars take no compression, as threads.
+    /// True if bars take no compression, as threads.
     #[serde(default)]
     pub tension_only: bool,
     /// Mass-proportional damping [1/s].
@@ -110,22 +111,21 @@ pub struct BodyTable {
     /// runs.
     #[serde(default)]
     pub velocity: Option<[f64; 3]>,
-    /// Displacement [m] of each node from rest at the start, of shells, and of solids with the solvers
-    /// `implicit` and `static`; the nodes of shells turn with the triangles round them. The mesh is the shape
-    /// at rest.
+    /// Displacement [m] of each node from rest at the start. The mesh is the shape at rest. For shells, whose
+    /// nodes turn with the triangles around them, and for solids with the solvers `implicit` and `static`.
     #[serde(default)]
     pub initial_displacement: Option<NodeVectors>,
-    /// Fibre direction at rest; overrides that of the law. Of a shell, the direction that the angles of its
-    /// `layers` count from.
+    /// Fibre direction at rest; overrides the direction of the law. For a shell, the direction from which the
+    /// angles of its `layers` count.
     #[serde(default)]
     pub fibre: Option<Fibre>,
-    /// Direction of the second family of fibres at rest; overrides that of the law.
+    /// Direction of the second family of fibres at rest; overrides the direction of the law.
     #[serde(default)]
     pub second_fibre: Option<Fibre>,
 }
 
 impl BodyTable {
-    /// Whether it names the parts of its cells that it fills, or its mesh has them.
+    /// True if the body fills its cells in part: it names the array of the parts, or its mesh has them.
     pub fn is_filled_in_part(&self) -> bool {
         self.fraction.is_some() || self.mesh.made_of() == Cells::ImmersedHexes
     }
@@ -139,8 +139,8 @@ fn no_law() -> ByLabel<String> {
     ByLabel::Each(BTreeMap::new())
 }
 
-/// A layer of a shell: linearly elastic in plane stress, by a `law` (that of the body if not given) or by
-/// moduli of its own along and across its direction.
+/// A layer of a shell: linearly elastic in plane stress. It has a `law` (the body's if not given), or moduli
+/// of its own along and across its direction.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct LayerTable {
@@ -166,13 +166,13 @@ pub struct LayerTable {
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub shear_modulus: Option<f64>,
-    /// Mass per volume [kg/m³]; that of the body if not given.
+    /// Mass per volume [kg/m³]; the body's if not given.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub density: Option<f64>,
 }
 
-/// How a body is modelled.
+/// Model of a body.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum BodyModel {
@@ -201,13 +201,13 @@ impl BodyModel {
     }
 }
 
-/// Where the normals at rest of a shell come from.
+/// Source of the normals at rest of a shell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Normals {
     /// The point data `normal` of its mesh, as `pliant mesh --as shells` writes them.
     Mesh,
-    /// The mean of the triangles round each node.
+    /// The mean of the triangles around each node.
     Triangles,
 }
 
@@ -215,13 +215,13 @@ pub enum Normals {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Thickness {
-    /// The same everywhere [m].
+    /// One thickness everywhere [m].
     Uniform(#[schemars(extend("exclusiveMinimum" = 0.0))] f64),
     /// One for each triangle.
     PerCell(ThicknessRule),
 }
 
-/// Where the thickness of each triangle comes from.
+/// Source of the thickness of each triangle.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum ThicknessRule {
@@ -250,7 +250,7 @@ impl<T> ByLabel<T> {
         }
     }
 
-    /// All values.
+    /// Returns all values.
     pub fn values(&self) -> Vec<&T> {
         match self {
             Self::One(value) => vec![value],
@@ -272,23 +272,23 @@ pub struct Density(pub f64);
 pub struct Hourglass(pub f64);
 
 impl Hourglass {
-    /// Of a body that gives none: a bent cube then has the right energy.
+    /// Default, with which a bent cube has the right energy.
     pub const DEFAULT: Self = Self(0.2);
 }
 
-/// Fibre direction at rest: `fibre = [0, 0, 1]` for one direction everywhere, whose length does not matter,
-/// or a table with exactly one of the keys below for a direction in each element, such as
+/// Fibre direction at rest. `fibre = [0, 0, 1]` is one direction everywhere; its length does not matter. A
+/// table with exactly one of the keys below gives a direction in each element, such as
 /// `fibre = { cell-data = "fibre" }`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Fibre {
-    /// The same direction everywhere; its length does not matter.
+    /// One direction everywhere; its length does not matter.
     Uniform([f64; 3]),
     /// A direction for each cell, from the mesh or by a rule.
     PerCell(FibreRule),
 }
 
-/// Where the fibre direction of each cell comes from. A rule asks at the centre of a cell.
+/// Source of the fibre direction of each cell. A rule is evaluated at the centre of a cell.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum FibreRule {
@@ -320,8 +320,8 @@ pub enum FibreRule {
         #[serde(rename = "closest-to")]
         closest_to: [f64; 3],
     },
-    /// From one part of the surface to another, along the gradient of the harmonic function (Laplace's
-    /// equation) that is 0 on the one and 1 on the other:
+    /// From one part of the surface to another, along the gradient of a harmonic function (Laplace's
+    /// equation). The function is 0 on the first part and 1 on the second:
     /// `{ laplace = { from = { set = "inner" }, to = { set = "outer" } } }`.
     Laplace {
         /// The nodes where it is 0.
@@ -335,7 +335,7 @@ fn boundary() -> Selection {
     Selection::Boundary
 }
 
-/// How cells resist deformation.
+/// Resistance of cells to deformation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Element {
@@ -343,8 +343,8 @@ pub enum Element {
     Tet4,
     /// Linear tetrahedron with average nodal pressure (Bonet and Burton 1998): the recommended tetrahedron.
     Tet4Anp,
-    /// Linear tetrahedron with improved average nodal pressure, variational: softer still; watch for pressure
-    /// modes.
+    /// Linear tetrahedron with improved average nodal pressure, in variational form. Even softer; watch for
+    /// pressure modes.
     Tet4Ianp,
     /// Linear tetrahedron with improved average nodal pressure as in NiftySim; not the gradient of an energy.
     Tet4IanpNiftysim,
@@ -355,20 +355,20 @@ pub enum Element {
     /// energy of the volume alone.
     Hex8Full,
     /// Shell: discrete Kirchhoff triangle and the mean membrane strain of the curved triangle: the
-    /// recommended one.
+    /// recommended shell.
     DktCurved,
     /// Shell: discrete Kirchhoff triangle and optimal flat ANDES membrane, whose drilling adapts to the
-    /// thickness. `dkt-curved` is this on flat walls; on curved walls under pressure this one scatters
-    /// displacements from node to node.
+    /// thickness. On flat walls it is the same as `dkt-curved`. On curved walls under pressure its
+    /// displacements scatter from node to node.
     DktOpt,
-    /// Shell: discrete Kirchhoff triangle and constant-strain membrane, too stiff for bending in its plane,
-    /// and calm under pressures that stretch thin curved walls much.
+    /// Shell: discrete Kirchhoff triangle and constant-strain membrane, too stiff for bending in its plane.
+    /// Stable under pressures that stretch thin curved walls much.
     DktCst,
     /// Shell without bending, in small strain: a constant-strain membrane whose nodes do not turn. In large
     /// strain take `model = "membrane"`.
     Membrane,
-    /// Shell without membrane: bending and twist of plates, for studies; something else must hold it in its
-    /// plane.
+    /// Shell without membrane: bending and twist of plates, for studies. Other constraints must hold it in
+    /// its plane.
     Plate,
     /// Shell: the element of Comas (2010), corrected for its typing errors. Only for comparison: it depends
     /// on the numbering of the corners and converges to plates 6 to 26 % too soft.
@@ -402,7 +402,7 @@ impl Element {
 pub struct SurfaceTable {
     /// The body that carries it.
     pub on: String,
-    /// The surface: triangles or quads of a file, the boundary of a built-in shape, or of an image its
-    /// boundary or, with `as = "surface"`, its smooth surface.
+    /// The surface: triangles or quads of a file, or the boundary of a built-in shape or an image. With
+    /// `as = "surface"`, the smooth surface of an image.
     pub mesh: MeshTable,
 }

@@ -44,7 +44,7 @@ pub struct SheetGrid {
     /// Cells of the grid along its two axes; if not given, from `edge`.
     #[serde(default)]
     pub cells: Option<[u32; 2]>,
-    /// How cells become triangles.
+    /// Pattern that cuts cells into triangles.
     #[serde(default)]
     pub pattern: PatternName,
     /// Largest shift of inner points along each axis, at random, as a part of a cell, below 0.5.
@@ -56,7 +56,7 @@ pub struct SheetGrid {
     pub seed: u64,
 }
 
-/// How the cells of a grid become triangles.
+/// Pattern that cuts the cells of a grid into triangles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum PatternName {
@@ -67,7 +67,7 @@ pub enum PatternName {
     Antidiagonal,
     /// Two triangles, diagonals mirrored from cell to cell.
     UnionJack,
-    /// Four triangles round the middle.
+    /// Four triangles around the middle.
     Crossed,
 }
 
@@ -104,14 +104,15 @@ pub struct CylinderShape {
     pub grid: SheetGrid,
 }
 
-/// A sphere: an icosahedron whose triangles are cut into four again and again.
+/// A sphere: an icosahedron whose triangles are repeatedly cut into four.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct SphereShape {
     /// Radius [m].
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub radius: f64,
-    /// How often triangles are cut: 0 makes 20, 1 makes 80, 2 makes 320; if not given, from `edge`.
+    /// Number of times that triangles are cut: 0 makes 20, 1 makes 80, 2 makes 320; if not given, from
+    /// `edge`.
     #[serde(default)]
     pub levels: Option<u32>,
 }
@@ -172,15 +173,15 @@ pub struct TwistedStripShape {
     pub grid: SheetGrid,
 }
 
-/// An intra-ocular lens: a disc, the optic, and two loops half a turn apart, the haptics. From the x axis on
-/// a haptic leaves the optic, and goes on at the overall diameter.
+/// An intra-ocular lens: a disc, the optic, and two loops half a turn apart, the haptics. A haptic leaves the
+/// optic at the x axis and continues at the overall diameter.
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct LensShape {
     /// Diameter of the optic [m].
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub optic: f64,
-    /// Diameter of the circle around all of it [m].
+    /// Diameter of the circle around the whole lens [m].
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub overall: f64,
     /// Width of a haptic [m].
@@ -189,7 +190,7 @@ pub struct LensShape {
     /// Angle over which a haptic leaves the optic [degrees].
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 180.0))]
     pub transition: f64,
-    /// Angle over which a haptic goes in all [degrees].
+    /// Whole angle of a haptic [degrees].
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 180.0))]
     pub sweep: f64,
 }

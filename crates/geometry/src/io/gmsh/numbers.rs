@@ -5,7 +5,7 @@ use std::fmt::Arguments;
 use crate::io::cursor::{Cursor, Order, Scalar};
 use crate::io::error::{Fault, Place};
 
-/// How the numbers of the file are stored.
+/// Storage of the numbers of the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Encoding {
     Text,

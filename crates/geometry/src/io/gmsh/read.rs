@@ -209,7 +209,7 @@ fn read_names(cursor: &mut Cursor<'_>, names: &mut BTreeMap<(i64, i64), String>)
     Ok(())
 }
 
-/// The text between the first and the last quote, or all of it.
+/// The text between the first and the last quote, or the whole text without them.
 fn unquoted(line: &[u8]) -> &[u8] {
     let line = line.trim_ascii();
     match line {

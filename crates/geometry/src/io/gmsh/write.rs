@@ -204,7 +204,7 @@ fn write_entities(out: &mut dyn Write, mesh: &Mesh, entities: &Entities<'_>) -> 
     writeln!(out, "$EndEntities")
 }
 
-/// All nodes as one block, on the first entity of the highest dimension.
+/// Writes the nodes as one block, on the first entity of the highest dimension.
 fn write_nodes(out: &mut dyn Write, mesh: &Mesh, entities: &Entities<'_>) -> io::Result<()> {
     let dimension = entities.iter().rposition(|of_dimension| !of_dimension.is_empty()).unwrap_or(0);
     let count = mesh.points.len();

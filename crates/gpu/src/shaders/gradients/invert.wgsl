@@ -49,7 +49,7 @@ fn product(l: Block, r: Block) -> Block {
     return Block(l.a * r.a + l.b * r.c, l.a * r.b + l.b * r.d, l.c * r.a + l.d * r.c, l.c * r.b + l.d * r.d);
 }
 
-// The inverse of a pivot; zero where nothing but round-off is left of it, as about axes without stiffness.
+// The inverse of a pivot; zero where only round-off is left in the pivot, as about axes without stiffness.
 fn over(pivot: f32, whole: f32) -> f32 {
     return select(0.0, 1.0 / pivot, pivot > 1e-6 * whole);
 }

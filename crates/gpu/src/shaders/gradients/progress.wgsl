@@ -10,8 +10,8 @@ struct Progress {
     most: u32,
     // 0 before r·z is known for the first time.
     started: u32,
-    // 0: it goes on; 1: the goal is reached; 2: no iterations are left; 3: a direction without positive
-    // stiffness.
+    // 0: the iterations continue; 1: the goal is reached; 2: no iterations are left; 3: a direction without
+    // positive stiffness.
     end: u32,
     unused: u32,
 }

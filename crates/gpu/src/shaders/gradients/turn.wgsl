@@ -1,4 +1,4 @@
-// The end of an iteration: p ← z + β p with the rigid motions of aggregates in z, and whether to go on.
+// The end of an iteration: p ← z + β p with the rigid motions of aggregates in z, and the decision to stop.
 @group(1) @binding(0) var<storage, read> now: Progress;
 @group(1) @binding(1) var<storage, read_write> next: Progress;
 @group(2) @binding(0) var<storage, read> curvatures: array<f32>;

@@ -1,4 +1,5 @@
-// x += α p, r −= α A p and z = D⁻¹ r of an aggregate; its r·r and r·z, and the force on its rigid motions.
+// Updates x += α p, r −= α A p and z = D⁻¹ r of an aggregate. Finds its r·r and r·z, and the force on its
+// rigid motions.
 @group(1) @binding(0) var<storage, read> now: Progress;
 @group(2) @binding(0) var<storage, read> curvatures: array<f32>;
 @group(2) @binding(1) var<storage, read> start: array<u32>;

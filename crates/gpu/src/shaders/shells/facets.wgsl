@@ -1,6 +1,6 @@
 // Forces and moments of a facet on its corners: `facet_packs` of pliant-shells, from displacements instead of
 // positions, so that small strains keep their digits. With H = Σ u ⊗ ∇N in the axes at rest, C − I = H + Hᵀ +
-// HᵀH gives U − I; the frame is the least rotation to the normal and the polar rotation in the plane.
+// HᵀH gives U − I. The frame is the least rotation to the normal and the polar rotation in the plane.
 
 // Of each node its displacement [m] and its rotation from rest.
 @group(1) @binding(0) var<storage, read> places: array<vec4f>;
@@ -27,13 +27,13 @@ fn three(entry: u32, facet: u32) -> vec3f {
 // Where a facet is, in its axes at rest.
 struct Placed {
     axes: mat3x3f,
-    // Displacements of the second and the third corner from that of the first.
+    // Displacements of the second and the third corner relative to the first.
     moved: array<vec3f, 2>,
     // Rotations of the nodes.
     rotation: array<vec4f, 3>,
 }
 
-// A rotation vector, and η of it.
+// A rotation vector, and its η.
 fn logarithm(rotation: vec4f) -> vec4f {
     var q = rotation * inverseSqrt(dot(rotation, rotation));
     if q.w < 0.0 {

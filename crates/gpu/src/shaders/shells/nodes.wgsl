@@ -6,8 +6,8 @@
 // Velocity [m/s] and spin [rad/s] half a step before; with the spin the work [J] of forces from outside since
 // the last read-back.
 @group(1) @binding(1) var<storage, read_write> rates: array<vec4f>;
-// (1 − αh/2)/(1 + αh/2), h/m/(1 + αh/2), h/I/(1 + αh/2), and bits: the six held components; then that it has
-// no mass.
+// Factors (1 − αh/2)/(1 + αh/2), h/m/(1 + αh/2) and h/I/(1 + αh/2), and bits. The bits are the six held
+// components, then a mark that the node has no mass.
 @group(1) @binding(2) var<storage, read> kinds: array<vec4f>;
 // Where in a row of the table the motion of each node is; all bits: nowhere.
 @group(1) @binding(3) var<storage, read> motions: array<u32>;

@@ -16,7 +16,7 @@ use super::cube::smooth;
 /// Steps of a comparison.
 const STEPS: u64 = 200;
 
-/// Where the design does not matter.
+/// A design for tests in which it does not matter.
 pub const PLAIN: &[Design] = &[Design::Gather];
 
 /// A step that is stable for long.
@@ -34,18 +34,18 @@ pub fn distance(a: &[Vector<f64>], b: &[Vector<f64>]) -> f64 {
     norm(a.iter().zip(b).map(|(a, b)| a - b)) / norm(a.iter().copied()).max(1e-30)
 }
 
-/// In double precision.
+/// Converts to double precision.
 pub fn double(vectors: &[Vector<f32>]) -> Vec<Vector<f64>> {
     vectors.iter().map(|v| v.map(f64::from)).collect()
 }
 
-/// Those that are compared.
+/// Returns the energies that are compared.
 pub fn numbers(energies: &Energies) -> [f64; 6] {
     let Energies { kinetic, internal, damping, hourglass, external, step_changes, .. } = *energies;
     [kinetic, internal, damping, hourglass, external, step_changes]
 }
 
-/// One of a design.
+/// Makes a stepper of a design.
 pub fn stepper(device: &Device, model: &Model, step: f64, design: Design) -> GpuStepper {
     GpuStepper::new(device, model.clone(), step, Some(design)).unwrap_or_else(|error| panic!("{error}"))
 }
@@ -62,7 +62,7 @@ pub fn compare(device: &Device, what: &str, model: &Model, designs: &[Design]) {
     compare_from(device, what, (model, &vec![[0.0; 3]; model.node_count()]), step_of(model), designs);
 }
 
-/// As `compare`, by steps of `step` seconds from a displacement.
+/// Compares like `compare`, by steps of `step` seconds from a displacement.
 pub fn compare_from(
     device: &Device,
     what: &str,
@@ -78,8 +78,8 @@ pub fn compare_from(
     assert!(found.iter().all(Vec::is_empty));
 }
 
-/// As `compare`, of a body that touches rigid things; the force of each contact on the processor and on the
-/// device.
+/// Compares like `compare`, with a body that touches rigid things. Returns the force of each contact on the
+/// processor and on the device.
 pub fn compare_touching(
     device: &Device,
     what: &str,
@@ -140,7 +140,7 @@ fn run_both(
     forces
 }
 
-/// How far off displacements, velocities, energies and reactions are in single precision.
+/// Returns the errors of displacements, velocities, energies and reactions in single precision.
 fn errors(
     model: &Model,
     (reference, processor): (&State<f64>, &CentralDifference<f64>),
@@ -163,8 +163,8 @@ fn errors(
     [displacement, velocity, energy, reaction]
 }
 
-/// Holds errors to limits, or to twice those of the processor in single precision where these are larger, up
-/// to a hundred times the limits.
+/// Holds errors to limits. If twice the errors of the processor in single precision are larger, these are the
+/// limits, up to a hundred times the given ones.
 fn agree(what: &str, errors: [f64; 4], of_processor: [f64; 4], velocities_within: f64) {
     let [of_device, of_single] =
         [errors, of_processor].map(|all| all.map(|error| format!("{error:.1e}")).join(", "));
@@ -176,7 +176,7 @@ fn agree(what: &str, errors: [f64; 4], of_processor: [f64; 4], velocities_within
     }
 }
 
-/// Those the device can run.
+/// Returns the designs that the device can run.
 pub fn designs(device: &Device) -> impl Iterator<Item = Design> {
     let atomics = device.adapter().float_atomics;
     Design::ALL.iter().copied().filter(move |design| atomics || *design != Design::FloatAtomics)

@@ -17,7 +17,7 @@ use super::contact::{compare, moving, rigid, surface, time_of};
 use super::cube::{elastic, neo_hookean, smooth, tet_block};
 use crate::support;
 
-/// Adds a block of tetrahedra at a place, with nodes moved at random by up to `jitter` of a cell: no edges
+/// Adds a block of tetrahedra at a place, with nodes moved at random by up to `jitter` of a cell. No edges
 /// are parallel, and no faces flat, so that round-off decides nowhere what touches.
 fn add(model: &mut Model, name: &str, cells: [u32; 3], size: [f64; 3], place: &Isometry3<f64>, jitter: f64) {
     let (mut points, tets) = tet_block(cells, size);
@@ -43,7 +43,7 @@ fn askew(at: [f64; 3]) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(Vector3::from(at)), turn)
 }
 
-/// Of the first solid with the second, or with itself if there is no second, and with things.
+/// Makes contacts of the first solid with the second, or with itself if there is no second, and with things.
 fn touching(model: &Model, rigids: Vec<Rigid>, friction: f64) -> Arc<Contacts> {
     let own = surface(&model.solids[0]);
     let with = model.solids.get(1).map_or(With::Itself, |second| With::Body(surface(second)));
@@ -218,9 +218,9 @@ fn cubes_keep_their_momentum_and_their_bits_however_the_steps_are_divided() {
     assert!(off <= 1e-5, "{off:.1e}");
 }
 
-/// A block of 41,472 tetrahedra, its base held, and a lid of 2,304 above it: the time of a step without
-/// contact, with the lid out of reach, within the skin of the lists, and sunk in. `cargo test --release -p
-/// pliant-gpu --test gpu the_cost_of_pairs -- --include-ignored --nocapture`.
+/// A block of 41,472 tetrahedra, its base held, and a lid of 2,304 above it. The test prints the time of a
+/// step without contact, with the lid out of reach, within the skin of the lists, and sunk in. `cargo test
+/// --release -p pliant-gpu --test gpu the_cost_of_pairs -- --include-ignored --nocapture`.
 #[test]
 #[ignore = "measures time"]
 fn the_cost_of_pairs() {

@@ -20,9 +20,9 @@ use super::against::{PLAIN, compare_touching, designs, distance, double, load, s
 use super::cube::{EDGE, elastic, free_cube, held_cube, neo_hookean, smooth, tet_block};
 use crate::support;
 
-/// The faces of tetrahedra that no other one has, in the order in which a device takes them: it begins with
-/// faces that share no node, then come others. Impulses are found to a thousandth of the deepest gap, so that
-/// another order gives other last digits.
+/// The faces of tetrahedra that no other one has, in the order in which a device takes them. Faces that share
+/// no node come first, then others. Impulses are found to a thousandth of the deepest gap, so that another
+/// order gives other last digits.
 pub(super) fn surface(solid: &Solid) -> Surface {
     let mut sides = BTreeMap::new();
     let cells = &solid.cells;
@@ -55,12 +55,12 @@ pub(super) fn rigid(name: &str, shape: Shape, trajectory: Trajectory) -> Rigid {
     Rigid { name: name.into(), shape, trajectory, inside: false, jaw: None }
 }
 
-/// Goes from a place by a way in 0.3 s.
+/// Makes a trajectory from a place by a way in 0.3 s.
 pub(super) fn moving(from: Pose, way: [f64; 3]) -> Trajectory {
     Trajectory::by(from, way, smooth(0.3))
 }
 
-/// All of a body with each of some things.
+/// Makes contacts of all faces of a body with each of some things.
 pub(super) fn with(model: &Model, rigids: Vec<Rigid>, friction: f64) -> Arc<Contacts> {
     let surface = surface(&model.solids[0]);
     let contact = |(index, rigid): (usize, &Rigid)| Contact {
@@ -73,8 +73,8 @@ pub(super) fn with(model: &Model, rigids: Vec<Rigid>, friction: f64) -> Arc<Cont
     Arc::new(Contacts { rigids, contacts, ..Default::default() })
 }
 
-/// Displacements, velocities, energies and reactions as `compare` has them; forces differ by a thousandth of
-/// the largest one, or by twice the error of the processor in single precision.
+/// Compares displacements, velocities, energies and reactions like `compare`. Forces differ by a thousandth
+/// of the largest one, or by twice the error of the processor in single precision.
 pub(super) fn compare(
     device: &Device,
     what: &str,
@@ -104,7 +104,7 @@ fn tissue() -> Model {
     held_cube("tet4", elastic(neo_hookean()))
 }
 
-/// In every design that has contact.
+/// Tests every design that has contact.
 #[test]
 fn a_cube_falls_onto_a_slope() {
     let Some(device) = support::device() else { return };
@@ -213,8 +213,8 @@ fn jaws_close_on_a_cube() {
     compare(&device, "jaws", &model, &contacts, PLAIN);
 }
 
-/// A tool that points of faces touch, driven from the middle of a run on; the device takes rows in an order
-/// that varies, but always finds the same bits, however the steps are divided.
+/// A tool that points of faces touch is driven from the middle of a run on. The device takes rows in an order
+/// that varies. It always finds the same bits, however the steps are divided.
 #[test]
 fn a_driven_tool_gives_the_same_bits_however_the_steps_are_divided() {
     let Some(device) = support::device() else { return };
@@ -294,9 +294,9 @@ fn a_state_in_contact_goes_from_the_processor_to_the_device_and_back() {
     assert!(error <= 1e-5, "{error:.1e}");
 }
 
-/// A cube of 55,566 tetrahedra, its base held: the time of a step alone, beside a tool out of reach, and with
-/// one that is pressed in, which only nodes or points on faces, too, touch. `cargo test --release -p
-/// pliant-gpu --test gpu the_cost_of_contact -- --include-ignored --nocapture`.
+/// A cube of 55,566 tetrahedra, its base held. The test prints the time of a step alone, with a tool out of
+/// reach, and with a tool pressed in. Only nodes, or points on faces too, touch this tool. `cargo test
+/// --release -p pliant-gpu --test gpu the_cost_of_contact -- --include-ignored --nocapture`.
 #[test]
 #[ignore = "measures time"]
 fn the_cost_of_contact() {
@@ -342,7 +342,7 @@ pub(super) fn time_of(stepper: &mut GpuStepper, model: &Model, what: &str) -> f6
     spent
 }
 
-/// Processor time of this program [s], where Linux tells it: it counts in hundredths.
+/// Processor time of this program [s], where Linux has it, in steps of a hundredth.
 fn processor_time() -> Option<f64> {
     let told = std::fs::read_to_string("/proc/self/stat").ok()?;
     let (_, numbers) = told.rsplit_once(')')?;
@@ -351,7 +351,7 @@ fn processor_time() -> Option<f64> {
     Some((numbers.get(10)? + numbers.get(11)?) / 100.0)
 }
 
-/// A cube with so many cells of six tetrahedra along each edge, its base held.
+/// A cube with `cells` cells of six tetrahedra along each edge, its base held.
 fn large_cube(cells: u32) -> Model {
     let (points, tets) = tet_block([cells; 3], [EDGE; 3]);
     let mut model = Model::default();

@@ -92,7 +92,7 @@ pub fn tets_of(hexes: &[[u32; 8]]) -> Vec<[u32; 4]> {
     hexes.iter().flat_map(|hex| KUHN.map(|tet| tet.map(|corner| hex[corner]))).collect()
 }
 
-/// A block of so many cells of six tetrahedra along each edge, of a size [m] from the origin on.
+/// A block of `cells` cells of six tetrahedra along each edge, of a size [m] from the origin on.
 pub fn tet_block(cells: [u32; 3], size: [f64; 3]) -> (Vec<Vector<f64>>, Vec<[u32; 4]>) {
     let [nx, ny, nz] = cells;
     let all = |[nx, ny, nz]: [u32; 3]| {
@@ -110,7 +110,7 @@ pub fn tet_block(cells: [u32; 3], size: [f64; 3]) -> (Vec<Vector<f64>>, Vec<[u32
     (all([nx + 1, ny + 1, nz + 1]).map(point).collect(), tets_of(&hexes))
 }
 
-/// One body of an element.
+/// Builds a body of one element type.
 fn body(
     element: &str,
     material: Material,
@@ -171,7 +171,7 @@ pub fn free_cube(element: &str, material: Material) -> Model {
 
 /// A cube without any order.
 pub struct Jumble {
-    /// With its base held.
+    /// Model with its base held.
     pub model: Model,
     /// A smooth displacement at random, with strains of up to a fifth.
     pub start: Vec<Vector<f64>>,

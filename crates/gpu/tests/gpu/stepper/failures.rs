@@ -1,4 +1,4 @@
-//! What becomes of runs that can't go on.
+//! Failures of runs that can't continue.
 
 use std::thread;
 use std::time::Duration;
@@ -168,7 +168,7 @@ fn what_a_device_lacks_is_named_with_what_it_has() {
     }
 }
 
-/// What a device has less of.
+/// Reduction of a device's limits and features.
 type Lessen = fn(&mut wgpu::Limits, &mut wgpu::Features);
 
 #[test]

@@ -11,7 +11,7 @@ use super::against::{PLAIN, compare_from, designs, load, step_of};
 use super::cube::{CELLS, Jumble, elastic, every_law, jumbled_cube, layer, neo_hookean, top_quads};
 use crate::support;
 
-/// What differs most from design to design.
+/// Designs that differ most from each other.
 const EACH: &[Design] = &[Design::Gather, Design::Blocks, Design::Fast];
 
 fn compare(
@@ -40,7 +40,7 @@ fn every_law_on_every_kind_of_element() {
     }
 }
 
-/// Quads, or two triangles for each of them.
+/// Quads, or two triangles for each quad.
 fn top(cube: &Jumble, triangles: bool) -> Vec<Face> {
     let halves = |[a, b, c, d]: Face| vec![[a, b, c, NO_NODE], [a, c, d, NO_NODE]];
     let quads = top_quads().into_iter().map(|quad| quad.map(|corner| cube.node[corner as usize]));

@@ -252,7 +252,7 @@ fn a_state_goes_from_the_processor_to_the_device_and_back() {
 }
 
 /// A cube in vibrations that a step hardly resolves loses much of their energy, as on the CPU and not as
-/// without dissipation; the same with damping by stiffness.
+/// without dissipation. The same holds with damping by stiffness.
 #[test]
 fn vibrations_are_damped_as_on_the_processor() {
     let Some(device) = support::device() else { return };

@@ -1,4 +1,4 @@
-//! What a window needs: bodies that are held by hand, steps without a look, and points that never leave the
+//! Tests for windows: bodies that are held by hand, steps without a look, and points that never leave the
 //! device.
 
 use std::time::Duration;

@@ -28,7 +28,7 @@ use super::cube::{
 use super::failures::{failure_of, failure_on};
 use crate::support;
 
-/// Those that have ties, on this device.
+/// Returns the designs that have ties, on this device.
 fn with_ties(device: &pliant_gpu::Device) -> Vec<Design> {
     designs(device).filter(|&design| design != Design::Blocks).collect()
 }
@@ -190,7 +190,7 @@ fn held_loaded(element: &str) -> Model {
     model
 }
 
-/// Loads and grips that act on nodes that follow others act on these.
+/// Loads and grips on followers act on the followed nodes.
 #[test]
 fn loads_and_grips_on_followers() {
     let Some(device) = support::device() else { return };
@@ -260,8 +260,8 @@ fn relaxing() -> Model {
     barred(tied_blocks("tet4", "hex8", material))
 }
 
-/// The same bits however steps are divided, without a read-back, and from a state that was brought back in
-/// between.
+/// Steps give the same bits however they are divided, without a read-back, and from a state that was brought
+/// back in between.
 #[test]
 fn steps_of_tied_bodies_give_the_same_bits_divided_and_resumed() {
     let Some(device) = support::device() else { return };
@@ -302,7 +302,7 @@ fn steps_of_tied_bodies_give_the_same_bits_divided_and_resumed() {
     }
 }
 
-/// How far followers are from where their ties place them, over the size of all displacements.
+/// Returns the distance of followers from the places of their ties, over the size of all displacements.
 fn out_of_place(model: &Model, state: &State<f32>) -> f64 {
     let mut placed = state.displacement.clone();
     model.follow(&mut placed);

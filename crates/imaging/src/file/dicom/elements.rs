@@ -70,7 +70,7 @@ const SEQUENCES: [u32; 8] = [
 /// A DICOM file, decompressed if it was deflated.
 pub(super) struct DataSet<'a> {
     bytes: Cow<'a, [u8]>,
-    /// Where the data set begins in the bytes.
+    /// Offset of the data set in the bytes.
     start: usize,
     explicit: bool,
     order: Order,
@@ -78,7 +78,7 @@ pub(super) struct DataSet<'a> {
 }
 
 impl<'a> DataSet<'a> {
-    /// `None` if the bytes are not those of a DICOM file.
+    /// Reads the header of a DICOM file; `None` if the bytes are of another format.
     pub fn of(bytes: &'a [u8]) -> Result<Option<Self>, Fault> {
         if bytes.get(128..132) != Some(b"DICM") {
             return Ok(None);

@@ -262,8 +262,8 @@ impl Slice {
     }
 }
 
-/// Where the frames of a file are: what their functional groups say, shared or their own, and else the file
-/// as a whole.
+/// Places of the frames of a file. They come from the functional groups, shared or of one frame, otherwise
+/// from the file as a whole.
 struct Frames<'a> {
     elements: &'a Elements<'a>,
     shared: Option<&'a Elements<'a>>,

@@ -24,8 +24,9 @@ pub(super) fn layered(layers: &str, changes: &[(&str, &str)]) -> Workshop {
     wall(&[&own[..], changes].concat())
 }
 
-/// P L³/(3 E I) with E I about the neutral axis of two layers (Timoshenko 1925); turned by a right angle
-/// twice, they are the same; explicit and implicit motion agree; the mass is that of the layers.
+/// The deflection is P L³/(3 E I) with E I about the neutral axis of two layers (Timoshenko 1925). Layers
+/// turned by a right angle twice give the same, and explicit and implicit motion agree. The mass is the mass
+/// of the layers.
 #[test]
 pub(super) fn a_wall_of_layers_bends_as_a_beam_of_two_materials() {
     let deflection = |workshop: &Workshop| {

@@ -75,9 +75,9 @@ pub(super) fn coarse_meshes_of_curved_walls_under_pressure_are_warned_about() {
     );
 }
 
-/// A flat membrane held along its border bulges, with factors and with conjugate gradients, without tension
-/// and with some, which flattens it; the first is told. Held on one side it has no equilibrium under a
-/// pressure, and that is told without an infinite residual.
+/// A flat membrane held along its border bulges, with factors and with conjugate gradients; a tension
+/// flattens it. Without tension the run gives a warning. Held on one side the membrane has no equilibrium
+/// under a pressure, and the error has no infinite residual.
 #[test]
 pub(super) fn a_slack_membrane_is_told_and_starts() {
     let sides =
@@ -114,8 +114,8 @@ pub(super) fn a_slack_membrane_is_told_and_starts() {
     refused(&[(THICK, plate)], &["`pre-tension` is for a shell that resists in its plane"]);
 }
 
-/// Pulled by half its length the wall is told to be beyond small strain, with body, triangle and time; by 1 %
-/// it is not.
+/// A wall pulled by half its length gives a warning about large strain, with body, triangle and time; pulled
+/// by 1 % it gives none.
 #[test]
 pub(super) fn large_strains_are_told() {
     let pulled = |by: f64| {
@@ -165,7 +165,7 @@ pub(super) fn large_strains_are_told() {
     assert!(page.contains("| wall | 1."), "{page}");
 }
 
-/// What the warning advises: as a membrane of rubber the wall may be stretched by half, without a warning,
+/// The warning's advice works: as a membrane of rubber the wall may be stretched by half, without a warning,
 /// and keeps its volume.
 #[test]
 pub(super) fn a_membrane_takes_the_strain_that_is_too_large_for_a_shell() {
@@ -191,8 +191,8 @@ pub(super) fn a_membrane_takes_the_strain_that_is_too_large_for_a_shell() {
     assert!((thickness / 1.5_f64.powf(-0.5) - 1.0).abs() < 1e-4, "{thickness}");
 }
 
-/// A wall that is pulled by 1 % between straight ends and free to narrow is thinner by ν times that, and
-/// strained by that at its faces.
+/// A wall that is pulled by 1 % between straight ends and free to narrow gets thinner by ν × 1 %. Its faces
+/// are strained by 1 %.
 #[test]
 pub(super) fn a_pulled_shell_tells_how_thin_it_is() {
     let workshop = wall(&[

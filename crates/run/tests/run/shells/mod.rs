@@ -1,4 +1,4 @@
-//! Shells: what is refused and in which words, what a failed run keeps, and what a run that went well leaves.
+//! Shells: refusals and their words, outputs of a failed run, and outputs of a run that went well.
 
 mod layers;
 mod membranes;
@@ -217,8 +217,8 @@ fn singular_stiffness_names_the_node_and_what_to_try() {
     );
 }
 
-/// M = F L at the clamp of a cantilever with a force F at its end: in the field of its nodes and about a
-/// point; force and moment balance.
+/// The moment at the clamp of a cantilever with a force F at its end is M = F L. The field of its nodes and
+/// the moment about a point both show it, and force and moment balance.
 #[test]
 fn a_clamp_resists_the_moment_of_a_force_at_the_end() {
     let force = 1e-6;
@@ -279,8 +279,8 @@ fn a_stout_strip_is_noted() {
     }
 }
 
-/// A path by arc length ends where the load is as written, or where it is told to; what it says nothing about
-/// goes on.
+/// A path by arc length ends where the load reaches its full size, or at its `stop`. A `stop` without a load
+/// factor lets the path pass the full load.
 #[test]
 fn a_path_by_arc_length_ends() {
     let path = |stop: &str| {
@@ -318,8 +318,8 @@ fn a_path_by_arc_length_ends() {
     refused(&[(STEPS, &run(volume))], &["`stop` is for `arc-length`"]);
 }
 
-/// What the usual steps damp away in a second is still there with steps of second order; with other solvers
-/// they are refused.
+/// A vibration that the usual steps damp away is still there with steps of second order. Other solvers refuse
+/// the integrator.
 #[test]
 fn an_integrator_of_second_order_keeps_vibrations() {
     let swing = |integrator: &str| {
@@ -621,8 +621,8 @@ fn a_carried_surface_follows_a_rigid_motion_exactly() {
     }
 }
 
-/// How often each edge of a mesh of triangles is used; points at the same place (moved by `displacement`) are
-/// one.
+/// Number of triangles at each edge of a mesh of triangles; points at the same place (moved by
+/// `displacement`) count as one.
 fn sides(mesh: &Mesh) -> BTreeMap<[[i64; 3]; 2], u32> {
     let moved = &mesh.point_data["displacement"];
     let place = |node: u32| {

@@ -63,7 +63,7 @@ pub(super) fn what_acts_on_the_same_nodes_along_several_axes_becomes_one() {
     assert_eq!(imported.scene.matches("[load.").count(), 1);
 }
 
-/// NiftySim first sets what is held to 0, then adds what is displaced.
+/// NiftySim first sets held components to 0, then adds displaced ones.
 #[test]
 pub(super) fn where_nodes_are_held_and_displaced_they_are_displaced() {
     let more = "<Constraint Type=\"Fix\" DOF=\"all\" NumNodes=\"4\"><Nodes>0 1 2 3</Nodes></Constraint>\

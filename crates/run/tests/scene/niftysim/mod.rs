@@ -150,7 +150,7 @@ fn hourglass_stiffness_is_scaled_as_niftysim_scales_it() {
     assert_note(&imported, "0.075 (λ + 2μ), which is 0.8250 μ");
 }
 
-/// Of Arruda and Boyce's law NiftySim takes the coefficient μ, a scene the shear modulus at rest.
+/// NiftySim takes the coefficient μ of Arruda and Boyce's law, a scene takes the shear modulus at rest.
 #[test]
 fn arruda_boyce_and_polynomial_keep_their_parameters() {
     let imported = import(&sample("H8_AB.xml")).unwrap();
@@ -261,9 +261,9 @@ fn a_mesh_file_is_placed_in_the_order_of_niftysim() {
     io::write(&folder.0.join("tets.msh"), mesh).unwrap();
     io::write(&folder.0.join("tets.vtu"), mesh).unwrap();
     for (tag, file) in [("MSHMesh", "tets.msh"), ("VTKMesh", "tets.vtu")] {
-        // From the centre (1, 1, 0): node 0 at (−1, −1, 0), around z to (1, −1, 0), around x to (1, 0, −1);
-        // then twice (2, 1, −1), then shifted. The other way round, first x and then z, it would come to (0,
-        // −1, −1).
+        // Rotation from the centre (1, 1, 0): node 0 at (−1, −1, 0), around z to (1, −1, 0), around x to (1,
+        // 0, −1). Then it is doubled to (2, 1, −1), and shifted. The other way round, first x and then z, it
+        // would come to (0, −1, −1).
         let placed = format!(
             "<{tag} Type=\"T4\">\n  {file}\n  <Translation>0 0 10</Translation><ScaleFactor>2</ScaleFactor>\
              <Rotation>1 1 0 90 0 90</Rotation></{tag}>"
@@ -521,7 +521,7 @@ fn damage(bytes: &[u8], folder: &Folder, rounds: usize) {
         }
         fs::write(&path, &damaged).unwrap();
         if let Ok(imported) = import(&path) {
-            // What is imported is TOML, whatever it says.
+            // An import is valid TOML, whatever it contains.
             Source::parse("scene.toml", imported.scene).unwrap_or_else(|error| panic!("{error}"));
         }
     }

@@ -94,7 +94,7 @@ pub(super) fn contact_counts_the_nodes_of_all_submodels() {
     assert_eq!(both.scene.matches("[contact.").count(), 2);
 }
 
-/// Each replacement in a good model with contact by a bad one, and what is said.
+/// Each replacement in a good model with contact by a bad one, and the words of the error.
 #[test]
 pub(super) fn mistakes_of_contact_and_membranes_are_named() {
     let good = with(&contact());

@@ -1,5 +1,5 @@
 //! Fibre directions of cells: the same everywhere, from the mesh, or by a rule at the centre of the cell.
-//! Tangents are those of the nearest point of the surface. Walls take the gradient of a harmonic function on
+//! Tangential fibres use the nearest point of the surface. Walls take the gradient of a harmonic function on
 //! the body's own elements. A cell without a direction is an error that names it.
 
 use pliant_format::diagnostic::Diagnostic;
@@ -16,7 +16,7 @@ use crate::assemble::meshes::list_cells;
 
 /// Directions shorter than this are zero.
 const ZERO: f64 = 1e-12;
-/// A direction by a rule is lost where its length is below this part of what it is elsewhere.
+/// A direction by a rule is undefined where its length is below this fraction of its usual length.
 const LOST: f64 = 1e-6;
 
 /// The fault of a rule: the keys below it, the message and what to do.
@@ -30,7 +30,7 @@ fn fault(at: &[&'static str], message: impl Into<String>, help: impl Into<String
     RuleFault { at: at.to_vec(), message: message.into(), help: help.into() }
 }
 
-/// Where a rule gives no direction, and what to do about it.
+/// Cells where a rule gives no direction, and the remedy.
 struct Lost {
     cells: &'static str,
     help: &'static str,
@@ -197,7 +197,7 @@ fn directions(
     }
 }
 
-/// The same direction for some cells.
+/// Returns one direction for some cells.
 fn along(direction: &[f64; 3], count: usize, at: &[&'static str]) -> Result<Directions, RuleFault> {
     let unit = axis_of(direction, "the fibre direction", at)?.into();
     Ok((vec![Some(unit); count], Lost { cells: "", help: "" }))
@@ -382,8 +382,8 @@ mod tests {
     fn tangential_on_a_sphere_is_orthogonal_to_the_radius() {
         let wanted = Vector3::new(0.3, 0.0, 1.0);
         for edge in [0.012, 0.006] {
-            // The nearest point lies on a facet that the cell looks at: it is aside by half the angle that
-            // the facet subtends, at the most. Near the middle of the sphere no facet is nearest.
+            // The nearest point lies on a facet that the cell looks at: its radius differs by at most half
+            // the angle that the facet subtends. Near the middle of the sphere no facet is nearest.
             let aside = 0.5 * edge / 0.05;
             let mesh = SPHERE.replace("0.012", &edge.to_string());
             let all = fibres(&mesh, "{ tangential = { closest-to = [0.3, 0, 1] } }");

@@ -1,4 +1,4 @@
-//! How much of each cell its body fills.
+//! Fraction of each cell that its body fills.
 
 use pliant_format::suggestion;
 use pliant_format::tables::Cells;
@@ -10,7 +10,7 @@ use crate::assemble::Context;
 use crate::assemble::meshes::list_cells;
 
 impl Context<'_> {
-    /// How much of each of some cells of a body is filled; diagnostics where the data are missing or wrong.
+    /// Returns the filled fraction of some cells of a body; diagnostics where the data are missing or wrong.
     pub(super) fn fractions(
         &mut self,
         draft: &Draft<'_>,

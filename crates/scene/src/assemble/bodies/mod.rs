@@ -34,7 +34,7 @@ pub(super) struct Draft<'a> {
     pub name: &'a str,
     /// Its table, where values by label have the labels' numbers.
     pub table: &'a BodyTable,
-    /// The same as the scene has it.
+    /// The table as it stands in the scene.
     pub given: &'a BodyTable,
     pub mesh: &'a Mesh,
     pub boundary: &'a Surface,
@@ -54,26 +54,26 @@ pub(super) struct Shape {
 struct MaterialCells {
     law: String,
     density: Density,
-    /// As it is given.
+    /// Hourglass key as it is given.
     hourglass: Option<Hourglass>,
     cells: Vec<u32>,
 }
 
-/// Bytes that an element of a model takes at least, by the largest memory of `pliant check` with blocks of
-/// 48,000 and 384,000 tets and plates of 20,000 and 80,000 shells: 410 and 9,320.
+/// Least number of bytes for an element of a model. The largest memory of `pliant check` gives 410 for tets
+/// in blocks of 48,000 and 384,000. It gives 9,320 for shells in plates of 20,000 and 80,000.
 const BYTES_OF_CELL: u64 = 400;
 const BYTES_OF_SHELL: u64 = 9000;
 
 /// The first phase: bodies with their meshes, cells and masses.
 pub(super) struct Meshed<'s> {
     pub context: Context<'s>,
-    /// All bodies; shells in scenes with some. Each phase adds to it.
+    /// The bodies of the scene, with shells in scenes that have some. Each phase adds to the assembly.
     pub assembly: Assembly,
     /// The cells of each body that an implicit solver advances.
     pub cells: Vec<BodyCells>,
     /// The meshes of the bodies.
     pub bodies: Vec<BuiltBody>,
-    /// Whether an earlier attempt has parted the shapes of bodies at rest.
+    /// True if an earlier attempt has parted the shapes of bodies at rest.
     pub is_parted: bool,
 }
 
@@ -117,7 +117,7 @@ impl Meshed<'_> {
         self.check_unused_laws();
     }
 
-    /// Whether the system has room for the model of a body; an error if not.
+    /// True if the system has room for the model of a body; an error if not.
     fn has_room(&mut self, name: &str, model: BodyModel, mesh: &Mesh) -> bool {
         let cells: usize = mesh.blocks.iter().map(|block| block.len()).sum();
         let each = if model == BodyModel::Shell { BYTES_OF_SHELL } else { BYTES_OF_CELL };
@@ -277,8 +277,8 @@ impl Meshed<'_> {
         }
     }
 
-    /// Puts the number of a label in place of its name; whether all names are known. Numbers stay as they are
-    /// written.
+    /// Replaces names of labels by their numbers; returns true if all names are known. Numbers keep their
+    /// spelling.
     fn number_keys<T>(&mut self, labels: &Labels, path: &[&str], map: &mut BTreeMap<String, T>) -> bool {
         let mut all = true;
         let mut numbered = BTreeMap::new();
@@ -311,8 +311,8 @@ impl Meshed<'_> {
         all
     }
 
-    /// Where values (law, density, …) go by label: whether each cell's label has one, and each label of
-    /// theirs a cell. The key comes with an example of a value.
+    /// Checks values by label (law, density, …): each cell's label needs a value, and each label with a value
+    /// needs a cell. The key comes with an example of a value.
     fn check_labels<T>(&mut self, name: &str, [key, example]: [&str; 2], values: &ByLabel<T>, mesh: &Mesh) {
         let ByLabel::Each(map) = values else { return };
         let path = ["body", name, key];
@@ -517,7 +517,7 @@ fn parts(table: &BodyTable, block: &CellBlock) -> Vec<MaterialCells> {
     parts.into_values().collect()
 }
 
-/// Where a body names a law: its `law`, or the label in it.
+/// Place in the scene where a body names a law: its `law`, or a label in it.
 pub(super) fn law_path<'a>(body: &'a str, choice: &'a ByLabel<String>, law: &str) -> Vec<&'a str> {
     let label = match choice {
         ByLabel::One(_) => None,

@@ -1,4 +1,4 @@
-//! Vectors on some nodes of a body, from its mesh file or a table beside the scene.
+//! Vectors on some nodes of a body, from its mesh file or a table next to the scene.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -12,7 +12,7 @@ use pliant_geometry::{DataArray, Mesh};
 
 use super::Meshed;
 
-/// What is wrong with a table of vectors, and what to do about it.
+/// Fault of a table of vectors, with its remedy.
 #[derive(Debug)]
 struct VectorFault {
     message: String,
@@ -82,8 +82,8 @@ fn of_data(name: &str, data: &DataArray, nodes: &[u32]) -> Result<Vec<[f64; 3]>,
     nodes.iter().map(vector).collect()
 }
 
-/// The rows of a table by node; `count` nodes are in the mesh file. Empty lines and what follows a # are
-/// passed over.
+/// Reads the rows of a table by node; `count` nodes are in the mesh file. Empty lines and text after a # are
+/// skipped.
 fn read_rows(
     found: io::Result<PathBuf>,
     path: &Path,

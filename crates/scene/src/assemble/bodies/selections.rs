@@ -12,7 +12,7 @@ use super::Meshed;
 const FAR: f64 = 10.0;
 
 impl Meshed<'_> {
-    /// The body of a name; a diagnostic at `path` if there is none.
+    /// Finds the body of a name; a diagnostic at `path` if there is no such body.
     pub(in crate::assemble) fn find_body(&mut self, name: &str, path: &[&str]) -> Option<usize> {
         let found = self.bodies.iter().position(|body| body.name == name);
         if found.is_none() {
@@ -94,7 +94,8 @@ impl Meshed<'_> {
     }
 }
 
-/// The points by which a selection takes nearest nodes, each with its distance [m] from the first of these.
+/// Returns the points by which a selection takes nearest nodes, each with its distance [m] from the nearest
+/// node.
 fn nearest_points(selection: &Selection, mesh: &Mesh) -> Vec<([f64; 3], f64)> {
     match selection {
         Selection::Nearest { point, .. } => {

@@ -23,7 +23,7 @@ const DRILLING: f64 = 0.01;
 /// Point data with the normals of a surface.
 const NORMAL: &str = "normal";
 
-/// Cell data of triangles that are flat beside curved ones: not 0 where they are.
+/// Cell data that is not 0 on triangles that stay flat among curved ones.
 const FLAT_CELLS: &str = "flat";
 
 /// Normals whose cosine is as close to 1 are parallel: to 0.1°.
@@ -373,8 +373,8 @@ impl Meshed<'_> {
                     let given = data.item(node as usize);
                     (own.node(node), Vector3::new(given[0], given[1], given[2]))
                 };
-                // Where a fit finds no normal that stands on all triangles it gives none: there they are
-                // estimated, with creases.
+                // A fit gives no normal at nodes where none fits all triangles: there normals are estimated,
+                // with creases.
                 let given: BTreeMap<u32, Vector3> = (0..mesh.points.len() as u32)
                     .map(of)
                     .filter(|(_, normal)| *normal != Vector3::zeros())
@@ -393,7 +393,7 @@ impl Meshed<'_> {
         }
     }
 
-    /// The triangles that the mesh keeps flat beside those that its normals curve.
+    /// The triangles that the mesh keeps flat among those that its normals curve.
     fn flat(&mut self, name: &str, block: &CellBlock) -> Vec<bool> {
         let Some(data) = block.data.get(FLAT_CELLS).filter(|data| data.components == 1) else {
             return Vec::new();

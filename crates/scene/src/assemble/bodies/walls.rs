@@ -95,7 +95,7 @@ impl Meshed<'_> {
         })
     }
 
-    /// Whether a law can be that of a body of its model.
+    /// True if a law fits the model of a body.
     pub(super) fn check_law_of_model(
         &mut self,
         draft: &Draft<'_>,

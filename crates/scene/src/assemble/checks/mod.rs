@@ -1,4 +1,5 @@
-//! The phase [`Checked`]: what a scene asks of its model is there, bodies are held, and mass is scaled.
+//! The phase [`Checked`]: the model has everything that the scene asks for, bodies are held, and mass is
+//! scaled.
 
 mod outputs;
 
@@ -94,7 +95,7 @@ impl Checked<'_> {
         self.notes.extend(notes);
     }
 
-    /// Refuses what a static solver cannot hold.
+    /// Refuses bodies that are free to move in a static run.
     fn check_held(&mut self) {
         if self.scene.run.solver != SolverName::Static {
             return;

@@ -1,4 +1,4 @@
-//! What outputs and the view ask for.
+//! Checks of outputs and of the view.
 
 use pliant_format::registry::OutputTable;
 use pliant_format::tables::{At, BodyModel, ColourBy, Component, CsvTable, FieldName, ProbeTable, VtuTable};
@@ -91,7 +91,7 @@ impl Checked<'_> {
         }
     }
 
-    /// Refuses forces of contacts where there are none.
+    /// Refuses forces of contacts on bodies without contacts.
     fn check_contacts_of_view(&mut self, target: Option<Option<Subject>>) {
         let path = ["view", "contacts"];
         match target {
@@ -248,8 +248,8 @@ impl Checked<'_> {
         }
     }
 
-    /// Rejects fields that are not carried by surfaces: those of nodes that say nothing between them, and of
-    /// bodies that carry none.
+    /// Rejects fields that surfaces cannot carry: fields without values between nodes, and fields of bodies
+    /// that carry no surface.
     fn refuse_fields_off_surfaces(&mut self, fields: &[FieldName], surface: usize, path: &[&str]) {
         let on_shell = self.assembly.carried.contains_key(&surface);
         if let Some(field) = fields.iter().find(|field| on_shell && **field != FieldName::Displacement) {

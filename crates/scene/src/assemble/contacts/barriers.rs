@@ -30,7 +30,7 @@ pub(super) struct BarrierTables {
     levels: Vec<u8>,
     /// The table of each contact.
     tables: Vec<String>,
-    /// Whether states are searched for intersections, also without barriers.
+    /// True if states are searched for intersections, also without barriers.
     pub check: bool,
 }
 
@@ -118,7 +118,7 @@ impl Loaded<'_> {
         Some(offset)
     }
 
-    /// How often the triangles of shells among these bodies are divided.
+    /// Number of times that the triangles of shells among these bodies are divided.
     fn level(&mut self, name: &str, table: &ContactTable, bodies: &[usize]) -> Option<u8> {
         let level = table.subdivision.unwrap_or(0);
         if level == 0 {
@@ -171,7 +171,7 @@ impl Loaded<'_> {
         cells.iter().map(|&cell| self.assembly.facets[cell as usize].thickness).fold(0.0, f64::max)
     }
 
-    /// Refuses what goes with no barrier: a controlled load, and jaws that hold by an ideal grip.
+    /// Refuses features that no barrier supports: a controlled load, and jaws that hold by an ideal grip.
     pub(super) fn check_goes_with_barriers(&mut self, name: &str, contacts: &Contacts) {
         if self.scene.run.control.is_some() {
             let help = "prescribe the load, or move a tool or nodes instead";
@@ -194,7 +194,7 @@ impl Loaded<'_> {
 }
 
 impl InContact<'_> {
-    /// Whether states that are written are searched for intersections, since no barrier keeps them away.
+    /// True if written states are searched for intersections, because no barrier prevents them.
     pub(in crate::assemble) fn checks_intersections(&self) -> bool {
         !self.scene.run.solver.solves_equations() && self.contacts.is_some() && self.terms.barriers.check
     }

@@ -45,7 +45,7 @@ pub(crate) fn usual_distance(
     KEPT * Pairs::new(first, second, 0.0, place).mean_edge()
 }
 
-/// What tells which distances [m] the surfaces of a contact keep since none is given.
+/// Remark on the distances [m] that the surfaces of a contact keep if none is given.
 pub(crate) fn told_distance(name: &str, [least, most]: [f64; 2]) -> String {
     let range = match least == most {
         true => number(most),
@@ -194,8 +194,9 @@ impl Loaded<'_> {
         all
     }
 
-    /// Notes the contacts of a table whose bodies keep less where they are nearer at the start, and the
-    /// distances that they keep if none is given. They come next after those that there are.
+    /// Notes contacts of a table whose bodies keep a smaller distance where they are nearer at the start.
+    /// Also notes the distances that bodies keep if none is given. The new contacts get the next numbers
+    /// after the present ones.
     fn keep_apart(&mut self, name: &str, table: &ContactTable, contacts: &[Contact], all: &mut Contacts) {
         let first = all.contacts.len();
         let mut usual: Option<[f64; 2]> = None;
@@ -275,8 +276,8 @@ impl Loaded<'_> {
         Some(all)
     }
 
-    /// Whether the solver knows contact, and the keys of a table go with it and with each other; mistakes are
-    /// reported.
+    /// True if the solver knows contact, and the keys of a table go with the solver and with each other.
+    /// Reports mistakes.
     fn check_contact(&mut self, name: &str, table: &ContactTable, is_barrier: bool) -> bool {
         let solver = self.scene.run.solver;
         if solver != SolverName::Explicit && !is_barrier {
@@ -299,7 +300,7 @@ impl Loaded<'_> {
         true
     }
 
-    /// The bodies of a contact, each with what it touches; every pair once.
+    /// Returns the bodies of a contact, each with its partner; every pair once.
     fn pairs(&mut self, name: &str, table: &ContactTable, rigids: &[Rigid]) -> Option<Vec<(usize, Partner)>> {
         let [first, second] = [0, 1].map(|side| self.partners(name, table, side, rigids));
         let (first, second) = (first?, second?);
@@ -416,7 +417,7 @@ impl Loaded<'_> {
         // Barriers act on tied nodes, which move with others by weights.
         let follows = self.assembly.followers();
         let tied = self.assembly.ties.iter().flat_map(Tie::rows);
-        // Barriers act on what a pressure fills, too.
+        // Barriers act on nodes around a constrained volume, too.
         let binds = |constraint: &&Constraint| {
             let motion = &constraint.motion;
             motion.is_collective() && !(is_barrier && motion.encloses())
@@ -564,7 +565,7 @@ impl Loaded<'_> {
 }
 
 impl InContact<'_> {
-    /// The surfaces of bodies that those of other participants touch.
+    /// Returns the surfaces of bodies that touch surfaces of other participants.
     pub fn meets(&mut self) -> Vec<Meet> {
         let scene = self.scene;
         let meet = |own: &mut Self, (name, table): &(String, ContactTable)| {
@@ -636,8 +637,8 @@ impl InContact<'_> {
     }
 }
 
-/// How deep [m] faces with edges of a length [m] hang into a round thing on which their corners lie: by up to
-/// edge²/(8 R). More than a tenth of it is no touch any more.
+/// Depth [m] by which faces with edges of a length [m] hang into a round thing on which their corners lie.
+/// The depth is up to edge²/(8 R). More than a tenth of the radius counts as an overlap.
 pub(super) fn hang(rigid: &Rigid, edge: f64) -> f64 {
     let radius = rigid.shape.thinnest();
     match rigid.shape {

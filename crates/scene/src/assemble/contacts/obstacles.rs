@@ -1,5 +1,5 @@
-//! Shapes of obstacles and tools from mesh files and images: signed distances of a closed surface on a grid,
-//! made once or read from the cache.
+//! Shapes of obstacles and tools from mesh files and images. They are signed distances of a closed surface on
+//! a grid, made once or read from the cache.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -17,8 +17,8 @@ use crate::assemble::Meshing;
 use crate::assemble::meshes::{SizeDoubt, content_of};
 use crate::cache::{KeptGrid, Key};
 
-/// Steps of a grid along the diagonal of the box, if no `resolution` is given: the error at a surface as
-/// round as the box is below 1e-5 of its diagonal, and 3.4 million points (13 MiB) are the most.
+/// Steps of a grid along the diagonal of the box, if no `resolution` is given. The error at a surface as
+/// round as the box is below 1e-5 of its diagonal. That makes at most 3.4 million points (13 MiB).
 const STEPS: f64 = 256.0;
 /// Steps along an edge of the surface, if no `resolution` is given and the triangles are small.
 const STEPS_PER_EDGE: f64 = 2.0;
@@ -30,14 +30,14 @@ const TOO_LARGE: f64 = 50.0;
 const MEBIBYTES: f64 = 4.0 / 1_048_576.0;
 
 impl Loaded<'_> {
-    /// The shape of a mesh file; `path` is that of its table.
+    /// Makes the shape of a mesh file; `path` is the place of its table.
     pub(super) fn shape_of_mesh(&mut self, table: &MeshTool, path: &[&str]) -> Option<Shape> {
         let source = MeshTable { file: Some(table.file.clone()), scale: table.scale, ..MeshTable::default() };
         let mesh = self.with_own_cells(&source, path)?.mesh;
         self.sampled(&mesh, &table.file, table.sampling(), path)
     }
 
-    /// The shape of a part of an image; `path` is that of its table.
+    /// Makes the shape of a part of an image; `path` is the place of its table.
     pub(super) fn shape_of_image(&mut self, table: &ImageTool, path: &[&str]) -> Option<Shape> {
         let source = MeshTable {
             image: Some(table.file.clone()),
@@ -98,7 +98,7 @@ impl Loaded<'_> {
         Some(Shape::Grid(Arc::new(grid)))
     }
 
-    /// Makes them; on failure the key to point at, the message and what to do.
+    /// Makes the distances; on failure returns the key to point at, the message and the remedy.
     fn distances(
         &self,
         mesh: &Mesh,

@@ -100,7 +100,7 @@ impl Loaded<'_> {
         })
     }
 
-    /// How a thing of a shape moves, without limits.
+    /// Returns the motion of a thing of a shape, without limits.
     fn trajectory(&mut self, thing: Thing<'_>, shape: &Shape) -> Option<Trajectory> {
         let Thing { kind, name, table } = thing;
         self.note_turns(&format!("{kind} `{name}`: `turn`"), Vector3::from(table.turn).norm());
@@ -241,7 +241,7 @@ impl Loaded<'_> {
     }
 }
 
-/// What a row of a table of poses holds.
+/// Format of a row in a table of poses, for messages.
 pub(super) const ROW: &str =
     "each row is `t,x,y,z,qw,qx,qy,qz`: a time in seconds, a position in metres, a unit quaternion";
 
@@ -249,21 +249,21 @@ pub(super) const ROW: &str =
 /// pushed along.
 pub(super) const FASTEST: f64 = 10.0;
 
-/// How far the length of a quaternion may be off 1.
+/// Allowed difference of the length of a quaternion from 1.
 pub(super) const UNIT: f64 = 1e-3;
 
 /// A part of a table of poses that is too fast.
 pub(super) struct Jump {
-    /// When the fastest one begins [s].
+    /// Time at which the fastest part begins [s].
     pub(super) time: f64,
-    /// How fast it is [m/s].
+    /// Speed of the fastest part [m/s].
     pub(super) speed: f64,
-    /// How late the tool comes to a row at most [s].
+    /// Longest delay of the tool at a row [s].
     pub(super) late: f64,
 }
 
-/// A table of poses without motions that are faster than [`FASTEST`]: rows come later where the tool cannot
-/// be there before, and it catches up after them. The tool has a radius [m].
+/// Slows a table of poses to at most [`FASTEST`]. Rows come later where the tool cannot be there before, and
+/// it catches up after them. The tool has a radius [m].
 pub(super) fn slowed(poses: Vec<(f64, Pose)>, reach: f64) -> (Vec<(f64, Pose)>, Option<Jump>) {
     if poses.windows(2).any(|rows| rows[0].0 >= rows[1].0) {
         return (poses, None);

@@ -1,8 +1,7 @@
-//! Bodies that overlap at the start are pushed apart: with the gap g < 0 of points Σ cᵢ xᵢ along a normal n,
-//! xᵢ += cᵢ n λ, λ = −g / Σ cᵢ². Passes over all contacts go on until nothing overlaps, and no edge of one
-//! body goes through another; nodes inside of bodies follow harmonically. With `separate` the shape at rest
-//! stays, so that the run starts deformed; with `gap` the shape at rest moves. Leaves out: whether bodies
-//! could have been moved as a whole.
+//! Bodies that overlap at the start are pushed apart. With the gap g < 0 of points Σ cᵢ xᵢ along a normal n,
+//! xᵢ += cᵢ n λ, λ = −g / Σ cᵢ². Passes over all contacts repeat until nothing overlaps, and no edge of one
+//! body goes through another. Nodes inside of bodies follow harmonically. With `separate` the shape at rest
+//! stays, so that the run starts deformed; with `gap` the shape at rest moves. No body is moved as a whole.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -43,8 +42,8 @@ struct Pushed {
     places: Vec<Vector3>,
     /// 1 along components that are free, else 0.
     free: Vec<Vector3>,
-    /// Gap [m] below which points are pushed, and the gap that is left between them: that of barriers,
-    /// without them none.
+    /// Gap [m] below which points are pushed, and the gap left between them. Barriers set the gaps; without
+    /// barriers no gap is left.
     least: f64,
     left: f64,
     /// Ways [m] up to this have no direction.
@@ -108,8 +107,8 @@ impl<'s> InContact<'s> {
         ways.iter().any(|way| *way != Vector3::zeros()).then_some(ways)
     }
 
-    /// The bodies with shapes at rest that have gone these ways [m], and a context to begin anew with. It has
-    /// the remarks on how the bodies were made, and how they were parted: the last one.
+    /// Returns the bodies with shapes at rest moved by these ways [m], and a context for a new start. The
+    /// context keeps the notes on how the bodies were made, and the last note: how they were parted.
     pub(in crate::assemble) fn parted(self, ways: &[Vector3]) -> (Context<'s>, Vec<BuiltBody>) {
         let Tied { meshed, noted, .. } = self.loaded.tied;
         let Meshed { context, assembly, mut bodies, .. } = meshed;
@@ -123,8 +122,8 @@ impl<'s> InContact<'s> {
         (Context { notes, ..Context::new(scene, cache, watch) }, bodies)
     }
 
-    /// Where nodes are [m] once nothing overlaps; `None` if something still does. Of each contact that counts
-    /// `kept` says below which gap [m] points are pushed, and which is left.
+    /// Returns the places of nodes [m] once nothing overlaps; `None` if something still does. For each
+    /// contact that counts `kept` gives the gap [m] below which points are pushed, and the gap that is left.
     fn push_all_apart(
         &mut self,
         asked: [&str; 2],
@@ -143,7 +142,7 @@ impl<'s> InContact<'s> {
             deepest: (0.0, Vector3::zeros()),
         };
         let check = IntersectionCheck::new(contacts, &self.assembly.rest);
-        // No barrier begins where an edge goes through a face by less than what explicit runs count.
+        // A barrier cannot begin with an edge through a face, even by less than explicit runs count.
         let check = if self.scene.run.solver.solves_equations() { check.of_all() } else { check };
         let mut crossings = Vec::new();
         for pass in 0..=PASSES {
@@ -199,7 +198,7 @@ impl<'s> InContact<'s> {
                 self.push_nodes_out(other, &contact.surface, pushed);
                 push_pairs(&contact.surface, other, pushed);
             }
-            // What is near at rest never touches.
+            // Surfaces that are near at rest never touch.
             With::Itself => {}
         }
     }
@@ -232,7 +231,7 @@ impl<'s> InContact<'s> {
         }
     }
 
-    /// Ways [m] of all nodes, where those inside of bodies that do not stay are means of those around.
+    /// Ways [m] of all nodes; inner nodes that do not stay take the mean of their neighbours.
     fn follow_inside(
         &self,
         contacts: &Contacts,
@@ -287,7 +286,7 @@ impl<'s> InContact<'s> {
         None
     }
 
-    /// Tells how many nodes were pushed, and how far.
+    /// Notes the number of pushed nodes, and the largest displacement.
     fn note_pushed(&mut self, before: &[Vector3], places: &[Vector3], least: f64, which: &str) {
         let ways = before.iter().zip(places).map(|(then, now)| (now - then).norm()).enumerate();
         let moved: Vec<(usize, f64)> = ways.filter(|(_, way)| *way > least).collect();
@@ -399,8 +398,8 @@ fn push_out(rigid: &Rigid, offset: f64, surface: &Surface, is_solid: bool, pushe
     }
 }
 
-/// How far [m] a point has to go along a direction to leave a thing whose thinnest part is known [m]; `None`
-/// if it is not that thin there, or without a direction.
+/// Returns the distance [m] along a direction from a point to the outside of a thing whose thinnest part is
+/// known [m]. Returns `None` without a direction, or if the thing is too thick there.
 fn way_out(from: &Vector3, along: &Vector3, thinnest: f64, gap: impl Fn(&Vector3) -> f64) -> Option<f64> {
     let mut way = 0.0;
     while way <= 4.0 * thinnest && *along != Vector3::zeros() {

@@ -221,7 +221,7 @@ impl Tied<'_> {
             }
             enclosure = Enclosure { faces: Vec::new(), facets };
         } else if volume < 0.0 {
-            // Those of a cavity face into it.
+            // The faces of a cavity point into it.
             enclosure.faces.iter_mut().for_each(turn_round);
         }
         if table.by <= -volume.abs() {
@@ -246,7 +246,7 @@ impl Tied<'_> {
         });
     }
 
-    /// How a constraint binds some nodes of a body to each other.
+    /// Returns the motion that binds some nodes of a body to each other.
     fn collective(
         &mut self,
         table: &ConstraintTable,
@@ -275,8 +275,8 @@ impl Tied<'_> {
         }
     }
 
-    /// What of the area of a body's boundary each of some nodes has, of the faces all of whose nodes they
-    /// are; equal parts without such faces. Sums to 1.
+    /// Shares of some nodes in the area of a body's boundary; only faces count all of whose nodes are chosen.
+    /// Without such faces the shares are equal. They sum to 1.
     fn shares(&self, body: usize, nodes: &[u32]) -> Vec<f64> {
         let (built, own) = (&self.bodies[body], &self.assembly.bodies[body]);
         let places: HashMap<u32, usize> = nodes.iter().copied().zip(0..).collect();

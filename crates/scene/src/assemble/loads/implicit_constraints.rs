@@ -38,7 +38,7 @@ impl Tied<'_> {
         Some(chosen)
     }
 
-    /// How nodes of shells are moved and turned.
+    /// Returns the motion that moves and turns nodes of shells.
     pub(in crate::assemble) fn motion_of_shell(
         &mut self,
         name: &str,

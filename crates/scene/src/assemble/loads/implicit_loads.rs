@@ -1,4 +1,4 @@
-//! Loads of the implicit solvers, and the control of one of them.
+//! Loads of the implicit solvers, and the control of one load.
 
 use std::collections::BTreeMap;
 
@@ -18,7 +18,7 @@ use pliant_sim::{RunControl, Stop};
 
 use crate::assemble::ties::{Subject, Tied};
 
-/// What acts, and the carried surface whose points it numbers.
+/// A load, and the carried surface whose points it numbers.
 type Acting = (LoadKind, Option<usize>);
 
 impl Tied<'_> {
@@ -297,7 +297,7 @@ impl Tied<'_> {
         control
     }
 
-    /// Where a path by arc length ends: at the load as written, unless `stop` says otherwise.
+    /// Returns the end of a path by arc length: a load factor of 1, unless `stop` gives another.
     fn stop(&mut self, table: Option<&StopTable>) -> Option<Stop> {
         let Some(table) = table else { return Some(Stop { load_factor: Some(1.0), ..Stop::default() }) };
         let scene = self.scene;

@@ -58,8 +58,8 @@ impl Tied<'_> {
         }
     }
 
-    /// The bodies that have nodes of their own, and with them mass: that of a wall on another body is the
-    /// mass of its nodes.
+    /// Returns the bodies that have nodes of their own and so a mass; the nodes of a wall on another body
+    /// hold the wall's mass.
     pub(super) fn bodies_with_nodes(&self) -> Vec<usize> {
         (0..self.assembly.bodies.len()).filter(|&body| !self.assembly.bodies[body].nodes.is_empty()).collect()
     }

@@ -29,18 +29,18 @@ impl SizeDoubt {
         (!(PLAUSIBLE_SIZE[0]..=PLAUSIBLE_SIZE[1]).contains(&size) && size > 0.0).then_some(Self { size })
     }
 
-    /// Whether it is too large for any organ.
+    /// True if the mesh is too large for any organ.
     pub fn is_large(&self) -> bool {
         self.size > PLAUSIBLE_SIZE[2]
     }
 
-    /// Whether it is larger than a person, and not too large for a part of a machine: a small organ in
+    /// True if the mesh is larger than a person, and not too large for a part of a machine. A small organ in
     /// millimetres has this size.
     pub fn is_possible(&self) -> bool {
         (PLAUSIBLE_SIZE[1]..=PLAUSIBLE_SIZE[2]).contains(&self.size)
     }
 
-    /// What to do; `scale` is how the factor is given, such as `--scale `.
+    /// Returns advice on the factor; `scale` is the text before it, such as `--scale `.
     pub fn advice(&self, scale: &str) -> String {
         match self.size {
             size if size > 1e4 => {
@@ -85,7 +85,7 @@ impl std::fmt::Display for SizeDoubt {
     }
 }
 
-/// Why no mesh could be made: the key to point at, the message and what to do.
+/// Reason why no mesh could be made: the key to point at, the message and the remedy.
 pub(super) struct MeshFault {
     pub key: &'static str,
     pub message: String,

@@ -32,27 +32,27 @@ const COARSEST: f64 = 0.25;
 /// Parts of the whole work that are done once the input is read, the body is cut out, and its shape is found.
 const DONE: [f64; 3] = [0.2, 0.3, 0.5];
 
-/// What is being done after that.
+/// Name of the last part of the work.
 const MAKING: &str = "making cells";
 
-/// Hears which part of the work is done, from 0 to 1, and what is being done.
+/// Receives the finished part of the work, from 0 to 1, and the name of the present work.
 type Watch<'w> = &'w dyn Fn(f64, &'static str);
 
-/// All that a mesh is made by, but for the image. Its debug text is its part of the key in the cache.
+/// Parameters of a mesh besides the image. Their debug text is a part of the key in the cache.
 #[derive(Clone, Debug)]
 struct Recipe {
     cleaning: Cleaning,
     cells: Goal,
 }
 
-/// What a body is made of.
+/// Source of a body.
 enum Scan {
     Image(Image, Choice),
     /// Triangles or quads in metres, and the notes about their file.
     Surface(MeshFile),
 }
 
-/// How fine tets or hexes are.
+/// Fineness of tets or hexes.
 #[derive(Clone, Debug)]
 struct Fineness {
     /// Their edge [m], if it is given.
@@ -79,7 +79,7 @@ enum Goal {
 }
 
 impl Context<'_> {
-    /// The mesh of what is segmented in an image, or of what the surface of a file encloses.
+    /// Makes the mesh of a segmentation in an image, or of the inside of the surface in a file.
     pub(in crate::assemble) fn scanned(&mut self, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
         let body = path.get(1).copied().unwrap_or_default();
         let heard = self.watch;
@@ -149,7 +149,8 @@ impl Context<'_> {
         Ok(Scan::Image(image, choice))
     }
 
-    /// The image, with the one that is added to it, or several masks as one; with the names of its labels.
+    /// Reads the image, with the image that is added to it, or several masks as one image; with the names of
+    /// its labels.
     fn read_images(&self, table: &MeshTable, watch: Watch<'_>) -> Result<Image, MeshFault> {
         let failed = |key, error: ImageError| {
             let help = match error {
@@ -199,7 +200,7 @@ impl Context<'_> {
     }
 }
 
-/// The labels that a table requests, as far as the image has them, or the threshold above which voxels are
+/// Chooses the labels that a table requests and the image has, or the threshold above which voxels are
 /// inside.
 fn choice(image: &mut Image, table: &MeshTable) -> Result<Choice, MeshFault> {
     if let (Some(threshold), None) = (table.threshold, &table.masks) {
@@ -217,7 +218,7 @@ fn choice(image: &mut Image, table: &MeshTable) -> Result<Choice, MeshFault> {
     })
 }
 
-/// The image with the vessels that run inside of the chosen labels as a part of these.
+/// Returns the image with the vessels inside of the chosen labels as a part of those labels.
 fn with_vessels(mut image: Image, choice: &Choice, table: &MeshTable) -> Result<Image, MeshFault> {
     let Some(vessels) = &table.vessels else { return Ok(image) };
     let Choice::Labels(organ) = choice else {
@@ -271,7 +272,7 @@ impl Scan {
         }
     }
 
-    /// What of the body the image may cut off.
+    /// Returns warnings about parts of the body that the border of the image may cut off.
     fn cut_off(&self) -> Vec<String> {
         let Self::Image(image, choice) = self else { return Vec::new() };
         let message = |(label, border): (i32, Border)| {
@@ -335,7 +336,7 @@ fn recipe(table: &MeshTable) -> Result<Recipe, MeshFault> {
     Ok(Recipe { cleaning, cells })
 }
 
-/// Whether a table says in one way only what of an image the body is.
+/// Checks that a table chooses the part of an image in exactly one way.
 fn require_one_cut(table: &MeshTable) -> Result<(), MeshFault> {
     let refuse =
         |key, message: &str, help: &str| Err(MeshFault { key, message: message.into(), help: help.into() });
@@ -589,7 +590,8 @@ impl Recipe {
         surface.fine_anatomy(1, edge, request.finest(), &|done| watch(DONE[2] * done, "finding the shape"))
     }
 
-    /// The body cut out of an image, what its cleaning changed, and the least step of its voxels [m].
+    /// Cuts the body out of an image. Returns it, the changes by cleaning, and the least step of its voxels
+    /// [m].
     fn anatomy(
         &self,
         image: &Image,
@@ -653,7 +655,8 @@ fn fill(
     Ok((mesh, doubts))
 }
 
-/// A surface in the requested triangles or shells, with warnings about it. That of an image keeps its volume.
+/// Covers a surface with the requested triangles or shells, with warnings. The surface of an image keeps its
+/// volume.
 fn cover(
     mut surface: TriangleMesh,
     goal: &Goal,

@@ -282,8 +282,8 @@ impl Context<'_> {
     }
 }
 
-/// What keeps a mesh of cells of a dimension from being simulated, with what to do about it. Other cells may
-/// be as they are.
+/// Returns the problems that keep a mesh of cells of a dimension from being simulated, with remedies. Cells
+/// of other dimensions do not count.
 fn problems(found: &Diagnosis, fixes: &[Fix], dimension: usize) -> Vec<(String, &'static str)> {
     let own = |cells: &[CellId]| -> Vec<CellId> {
         cells.iter().filter(|cell| cell.kind.dimension() == dimension).copied().collect()

@@ -17,7 +17,7 @@ struct OnGrid<'t> {
     grid: &'t SheetGrid,
 }
 
-/// Whether it is a built-in shape of triangles.
+/// True for a built-in shape of triangles.
 pub(in crate::assemble) fn is_sheet(table: &MeshTable) -> bool {
     table.sphere.is_some() || table.lens.is_some() || on_grid(table).is_some()
 }

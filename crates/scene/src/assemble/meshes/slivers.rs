@@ -12,8 +12,8 @@ const DOUBTED: f64 = 1e4;
 const REFUSED: f64 = 1e6;
 
 impl Context<'_> {
-    /// Refuses a mesh with triangles that are far too thin, and warns of thin ones; whether it can be taken.
-    /// Those without area have been refused.
+    /// Refuses a mesh with triangles that are far too thin, and warns of thin ones; returns true if the mesh
+    /// can be used. Triangles without area have been refused before.
     pub(super) fn check_slivers(&mut self, mesh: &Mesh, path: &[&str], place: &[&str]) -> bool {
         let Some(block) = mesh.block(CellKind::Triangle) else { return true };
         let aspect = |corners: &[u32]| {

@@ -12,16 +12,16 @@ use crate::assemble::{BuiltBody, in_metres};
 
 /// Part of the median edge of the followed body that a gap may have.
 pub(super) const GAP: f64 = 0.1;
-/// A body whose edges are longer by this factor than those of what it follows is coarser.
+/// A body whose edges are longer by this factor than the edges of the body that it follows is coarser.
 const COARSER: f64 = 1.2;
 
 /// Nodes of a body with the points of another one that they follow.
 pub(crate) struct Attached {
     /// The nodes, numbered in the first model.
     pub nodes: Vec<u32>,
-    /// Nodes of the second model with their weights, for each of them.
+    /// Nodes of the second model with their weights, for each node.
     pub mapping: Weights,
-    /// The cell that holds each of them; none by mortar rows.
+    /// Cell that holds each node; empty for mortar rows.
     pub(super) cells: Vec<CellId>,
     /// The widest gap [m].
     pub(super) widest: f64,

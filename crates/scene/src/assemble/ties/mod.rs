@@ -38,7 +38,7 @@ pub(super) struct Tied<'s> {
     pub surfaces: Vec<Mesh>,
     /// The curved surface of the shells, if something is carried by it.
     pub curved: Option<CurvedSurface>,
-    /// How many notes say how the bodies were made.
+    /// Number of notes on how the bodies were made.
     pub noted: usize,
 }
 
@@ -135,7 +135,7 @@ impl Meshed<'_> {
         Some(())
     }
 
-    /// What to do instead of a tie of two bodies that cannot be.
+    /// Returns advice for a tie of two bodies that cannot be.
     fn instead_of(&self, [guest, host]: &[String; 2], error: &TieError) -> String {
         let ties = || self.scene.ties.iter().map(|(_, table)| &table.between);
         match error {
@@ -143,7 +143,7 @@ impl Meshed<'_> {
                 "leave one of the two ties out".to_owned()
             }
             TieError::Chain { .. } => {
-                // What follows the guest, or what the host follows.
+                // A body that follows the guest, or a body that the host follows.
                 let chain = ties().find_map(|[a, b]| match () {
                     () if b == guest => Some((a, guest, host)),
                     () if a == host => Some((guest, host, b)),

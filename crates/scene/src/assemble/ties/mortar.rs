@@ -28,7 +28,7 @@ pub(super) struct Joint<'t> {
     pub host: usize,
 }
 
-/// Why mortar rows do not fit a tie.
+/// Reason why mortar rows do not fit a tie.
 struct Refusal {
     message: String,
     label: &'static str,
@@ -36,8 +36,8 @@ struct Refusal {
 }
 
 impl Meshed<'_> {
-    /// How nodes follow by the method of a tie, which have been found as points. `selected` are all nodes
-    /// that the tie names, numbered in the model.
+    /// Lets nodes that were found as points follow by the method of a tie. `selected` are all nodes that the
+    /// tie names, numbered in the model.
     pub(super) fn by_method(
         &mut self,
         joint: Joint<'_>,
@@ -114,8 +114,8 @@ impl Meshed<'_> {
         Ok(found)
     }
 
-    /// Whether a tie without a method takes its mortar rows: all selected nodes are on them, and none lies
-    /// deep in the other body or across a wide gap.
+    /// True if a tie without a method takes its mortar rows. The rows have to hold all selected nodes, and no
+    /// node may lie deep in the other body or across a wide gap.
     fn is_glued(&self, joint: Joint<'_>, points: &Attached, found: &MortarRows) -> bool {
         let BuiltBody { boundary, mesh, .. } = &self.bodies[joint.host];
         let most = GAP * median_edge(mesh);
@@ -139,7 +139,7 @@ impl Meshed<'_> {
         points.nodes.iter().filter(|node| !joined.contains(node)).copied().collect()
     }
 
-    /// The nodes with their rows in the model, and remarks on what is not tied.
+    /// Returns the nodes with their rows in the model, and notes nodes that are not tied.
     fn attached(&mut self, joint: Joint<'_>, points: &Attached, found: MortarRows) -> Attached {
         let Joint { name, table, guest, host } = joint;
         let names = &table.between;

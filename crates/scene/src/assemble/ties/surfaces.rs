@@ -15,7 +15,7 @@ use crate::assemble::meshes::{MeshOrigin, surface_of};
 const FAR: f64 = 0.05;
 
 impl Meshed<'_> {
-    /// Warns of what a body carries far outside of itself.
+    /// Warns of something that a body carries far outside of its mesh.
     pub(in crate::assemble) fn doubt_place(
         &mut self,
         what: &str,
@@ -128,8 +128,8 @@ mod tests {
         }
     }
 
-    /// De Visser and Comas (2008): what goes down by J comes up by its exact transpose, with nodes beyond the
-    /// body and with points beyond the cubes.
+    /// De Visser and Comas (2008): displacements go down by J, and forces come up by its exact transpose.
+    /// Some nodes lie beyond the body, and some points beyond the cubes.
     #[test]
     fn the_smooth_surface_of_immersed_cubes_follows_them_and_gives_its_forces_back() {
         let own = CUBE.lines().find(|line| line.starts_with("mesh")).unwrap();

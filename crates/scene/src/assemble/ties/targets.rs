@@ -16,7 +16,7 @@ pub(crate) enum Subject {
 }
 
 impl Tied<'_> {
-    /// The body or surface of a name; a diagnostic at `path` if there is none.
+    /// Finds the body or surface of a name; a diagnostic at `path` if there is no such name.
     pub(in crate::assemble) fn find_target(&mut self, name: &str, path: &[&str]) -> Option<Subject> {
         if let Some(index) = self.assembly.surfaces.iter().position(|surface| surface.name == name) {
             return Some(Subject::Surface(index));

@@ -8,7 +8,7 @@ use pliant_implicit::CarriedTurn;
 use super::Meshed;
 
 impl Meshed<'_> {
-    /// Whether tied nodes of one body can turn with another.
+    /// True if tied nodes of one body can turn with another.
     pub(super) fn can_turn(&mut self, name: &str, [guest, host]: [usize; 2], names: &[String; 2]) -> bool {
         let path = ["tie", name, "rotations"];
         if self.shell_cells(guest).is_none() {
@@ -25,7 +25,7 @@ impl Meshed<'_> {
         true
     }
 
-    /// How a node turns with cells of a solid: with the mean of their gradients, by volume.
+    /// Returns the rotation of a node with cells of a solid: with the mean of their gradients, by volume.
     pub(super) fn turn(&self, host: usize, node: u32, cells: &[CellId]) -> CarriedTurn {
         let (mesh, own) = (&self.bodies[host].mesh, &self.assembly.bodies[host]);
         let mut gradient: Vec<(u32, Vector3)> = Vec::new();
