@@ -641,8 +641,8 @@ mod tests {
         }
     }
 
-    /// The layout of [`SimulationState`] and [`Progressed`] decides which checkpoints can be read. Whoever changes it
-    /// gives [`FORMAT`] the next number, and this test the new bytes.
+    /// The layout of [`SimulationState`] and [`Progressed`] decides which checkpoints can be read. Whoever
+    /// changes it gives [`FORMAT`] the next number, and this test the new bytes.
     #[test]
     fn the_layout_of_format_20_is_as_it_was() {
         let bytes = |run: &str| {

@@ -27,8 +27,9 @@
 //! wall.add_shell(&Shell::new("wall", vec![[0, 1, 2]], 0.001, material))?;
 //! wall.model_mut().loads.push(Load::gravity(0, [0.0, 0.0, -9.81]));
 //!
-//! let parts = vec![ParticipantSetup::explicit("tissue", tissue, 0.1)?, ParticipantSetup::implicit("wall", wall, 0.1, 0.01)];
-//! let mut simulation = Simulation::new(Setup::new(parts))?;
+//! let tissue = ParticipantSetup::explicit("tissue", tissue, 0.1)?;
+//! let wall = ParticipantSetup::implicit("wall", wall, 0.1, 0.01);
+//! let mut simulation = Simulation::new(Setup::new(vec![tissue, wall]))?;
 //! simulation.run(0.1, |_| ())?;
 //! let frame = simulation.frame()?;
 //! for body in ["tissue", "wall"] {

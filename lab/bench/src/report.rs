@@ -304,8 +304,8 @@ impl Report {
                 self.settings.repeats, self.settings.seconds, self.settings.lanes
             ),
             self.rates_table(),
-            "Bytes and operations on the CPU are counted per element and step; \"copy\" and \"mul-add\" are their shares of the \
-             rates above. Δt is 0.9 × the critical time step of the assembled model (* of the element bound)."
+            "Bytes and operations on the CPU are counted per element and step. \"copy\" and \"mul-add\" are their shares of the \
+             rates above. Δt is 0.9 × the critical time step of the assembled model; with * of the element bound."
                 .to_owned(),
             rows_table(&self.rows),
         ];
@@ -318,8 +318,8 @@ impl Report {
         }
         if !self.cubes.is_empty() {
             parts.push(
-                "Largest cube in real time (0.1 m; brain-like NH, E = 3 kPa, ν = 0.45; liver-like TI+Prony), predicted from \
-                 the linear cost and Δt ∝ 1/n, measured, and measured again at the size estimated from that."
+                "Largest cube of 0.1 m in real time: brain-like NH with E = 3 kPa and ν = 0.45, and liver-like TI+Prony. The \
+                 prediction takes the linear cost and Δt ∝ 1/n. A first measurement estimates the size of the second."
                     .to_owned(),
             );
             parts.push(self.cubes_table());
