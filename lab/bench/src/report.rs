@@ -304,8 +304,9 @@ impl Report {
                 self.settings.repeats, self.settings.seconds, self.settings.lanes
             ),
             self.rates_table(),
-            "Bytes and operations on the CPU are counted per element and step. \"copy\" and \"mul-add\" are their shares of the \
-             rates above. Δt is 0.9 × the critical time step of the assembled model; with * of the element bound."
+            "Bytes and operations on the CPU are counted per element and step. The columns \"copy\" and \"mul-add\" are their \
+             shares of the rates above. The step Δt is 0.9 × the critical time step of the assembled model. With * it is of the \
+             element bound."
                 .to_owned(),
             rows_table(&self.rows),
         ];
