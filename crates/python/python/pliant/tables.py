@@ -17,44 +17,44 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Run(Table):
-    """`[run]`. How the scene is run.
+    """`[run]`. Settings of the run.
 
     Parameters
     ----------
     device
-        Where the solver runs. Takes one of "cpu", "gpu", "auto"; "cpu" if not given.
+        Device of the solver. Takes one of "cpu", "gpu", "auto"; "cpu" if not given.
     adapter
         The GPU, by a part of its name in `pliant devices`; if not given, the best one. Takes a text.
     design
-        How the kernels of a GPU bring forces from cells to nodes; if not given, the ways that measured best: `fast`, and `gather` on adapters that are software. Takes one of "gather", "blocks", "float-atomics", "fast".
+        Design of the GPU kernels that bring forces from cells to nodes. If not given, the ways that measured best: `fast`, and `gather` on adapters that are software. Takes one of "gather", "blocks", "float-atomics", "fast".
     precision
-        Number type of the solver; if not given, `double` on the CPU and `single` on a GPU, which has no other. Takes "single" or "double".
+        Number type of the solver; if not given, `double` on the CPU and `single` on a GPU, which has only this. Takes "single" or "double".
     solver
-        How the state goes from instant to instant. Takes one of "explicit", "quasi-static", "implicit", "static"; "explicit" if not given.
+        Solver that advances the state in time. Takes one of "explicit", "quasi-static", "implicit", "static"; "explicit" if not given.
     step
-        Time step [s], made a little shorter where it does not divide the duration; `auto`: 0.9 × the critical time step of the assembled model at rest, `load-steps` where the solver is `quasi-static` or `static`, and 0.01 s where it is `implicit`. Takes "auto" or a number, greater than 0; "auto" if not given.
+        Time step [s], made a little shorter if it does not divide the duration. `auto` is 0.9 × the critical time step of the assembled model at rest. With the solvers `quasi-static` and `static`, `auto` follows `load-steps`; with `implicit` it is 0.01 s. Takes "auto" or a number, greater than 0; "auto" if not given.
     on_unstable
-        What an explicit run does when the largest stable step of the deformed model, watched during the run, falls below its step; if not given, `substep`. Takes one of "substep", "stop", "report".
+        Reaction of an explicit run when the critical time step of the deformed model falls below its step. The critical step is watched during the run. If not given, `substep`. Takes one of "substep", "stop", "report".
     mass_scaling
         Makes the nodes that limit an explicit step heavier. Takes { target-step = … } or { share = … }.
     load_steps
-        Load steps of a quasi-static or static run with `step = "auto"`: so many equal ones, or the times at which they end. Takes a whole number or { times = … }, at least 1 and at most 1000000; 10 if not given.
+        Load steps of a quasi-static or static run with `step = "auto"`: their number if equal, or the times at which they end. Takes a whole number or { times = … }, at least 1 and at most 1000000; 10 if not given.
     tolerance
-        Largest residual force over the largest internal force (or load, or inertial force) at which an equilibrium is found; if not given, 1e-6 in double and 1e-4 in single precision with the solver `quasi-static`, 1e-8 with `static`, 1e-6 with `implicit`. Takes a number, greater than 0 and less than 1.
+        Largest residual force over the largest internal force (or load, or inertial force) at which an equilibrium is found. If not given, 1e-8 with the solver `static` and 1e-6 with `implicit`. With `quasi-static` 1e-6 in double and 1e-4 in single precision if not given. Takes a number, greater than 0 and less than 1.
     iterations
-        Iterations of Newton's method at the most in a step of `implicit` (20 if not given) or `static` (40). With 1 a step of `implicit` is one linear solution, and its residual is not checked: for real time. Takes a whole number, at least 1 and at most 10000.
+        Most iterations of Newton's method in a step of `implicit` (20 if not given) or `static` (40). With 1 a step of `implicit` is one linear solution, and its residual is not checked: for real time. Takes a whole number, at least 1 and at most 10000.
     speed_tolerance
-        Speed [m/s] of all nodes below which a Newton step of `implicit` in contact is the last one; it is still made. If not given, a step must move nothing by more than a thousandth of `barrier-distance`. Takes a number, greater than 0.
+        Speed [m/s] of all nodes below which a Newton step of `implicit` in contact is the last one; this step is still made. If not given, a step must move no node by more than a thousandth of `barrier-distance`. Takes a number, greater than 0.
     accept_unconverged
-        Whether a step of `implicit` whose `iterations` run out, or whose energy does not fall any more, goes on with what it has reached instead of being halved: bounded time, for real time. In contact that state has no intersection. Summary and window tell how many steps did so. Takes true or false.
+        True to accept the last state of an `implicit` step, instead of halving it, when its `iterations` run out or its energy stops falling. This bounds the time of a step, for real time. In contact that state has no intersection. Summary and window count these steps. Takes true or false.
     integrator
-        How `implicit` goes on in time; `backward-euler` if not given. Takes "backward-euler" or "bdf2".
+        Time integrator of `implicit`; `backward-euler` if not given. Takes "backward-euler" or "bdf2".
     linear
-        How `implicit` and `static` solve their linear equations. Takes "direct", "unsymmetric" or "conjugate-gradients" or { by = … }.
+        Linear solver of `implicit` and `static`. Takes "direct", "unsymmetric" or "conjugate-gradients" or { by = … }.
     control
-        What a `static` run prescribes instead of the size of a load, so that it goes past limit points. Takes { load = … }.
+        Quantity that a `static` run prescribes instead of the size of a load, so that it passes limit points. Takes { load = … }.
     allow_hourglass
-        The part of the internal energy that a run may hold in hourglass modes of `hex8` at its end. With more it writes all outputs and ends with an error: the shape of the elements is not resolved. Takes a number, at least 0; 0.1 if not given.
+        Part of the internal energy that may be in hourglass modes of `hex8` at the end of a run. With more, the run writes all outputs and ends with an error: the shape of the elements is not resolved. Takes a number, at least 0; 0.1 if not given.
     threads
         Threads; 0: one per core. The number never changes a result. Takes a whole number, at least 0 and at most 1024; 0 if not given.
     checkpoint
@@ -87,44 +87,44 @@ class Run(Table):
 
 @dataclass(frozen=True, kw_only=True)
 class Participant(Table):
-    """`[participant.NAME]`. Bodies with a solver and a step of their own. Bodies that no participant names follow `[run]`: with the solvers `implicit` and `static` all together, else the solids together and the shells together. Participants advance at their own steps and meet at common instants, where outputs see them. A key that is left out is as in `[run]`.
+    """`[participant.NAME]`. Bodies with a solver and a step of their own. Bodies that no participant names follow `[run]`: with the solvers `implicit` and `static` all together, else the solids together and the shells together. Participants advance at their own steps and meet at common instants, where outputs are written. A key that is left out has the value of `[run]`.
 
     Parameters
     ----------
     bodies
         The bodies: solids or shells, with the solvers `implicit` and `static` also both. Takes an array of texts.
     solver
-        As in `[run]`. Takes one of "explicit", "quasi-static", "implicit", "static".
+        Same as in `[run]`. Takes one of "explicit", "quasi-static", "implicit", "static".
     step
         Time step [s], as in `[run]`. Common instants are as far apart as the longest step of all participants; shorter steps are made a little shorter where they don't divide it. Takes "auto" or a number, greater than 0.
     on_unstable
-        As in `[run]`. Takes one of "substep", "stop", "report".
+        Same as in `[run]`. Takes one of "substep", "stop", "report".
     mass_scaling
-        As in `[run]`. Takes { target-step = … } or { share = … }.
+        Same as in `[run]`. Takes { target-step = … } or { share = … }.
     load_steps
-        As in `[run]`. Takes a whole number or { times = … }, at least 1 and at most 1000000.
+        Same as in `[run]`. Takes a whole number or { times = … }, at least 1 and at most 1000000.
     tolerance
-        As in `[run]`. Takes a number, greater than 0 and less than 1.
+        Same as in `[run]`. Takes a number, greater than 0 and less than 1.
     iterations
-        As in `[run]`. Takes a whole number, at least 1 and at most 10000.
+        Same as in `[run]`. Takes a whole number, at least 1 and at most 10000.
     speed_tolerance
         Speed [m/s] below which a Newton step in contact is the last one, as in `[run]`. Takes a number, greater than 0.
     accept_unconverged
-        As in `[run]`. Takes true or false.
+        Same as in `[run]`. Takes true or false.
     integrator
-        As in `[run]`. Takes "backward-euler" or "bdf2".
+        Same as in `[run]`. Takes "backward-euler" or "bdf2".
     linear
-        As in `[run]`. Takes "direct", "unsymmetric" or "conjugate-gradients" or { by = … }.
+        Same as in `[run]`. Takes "direct", "unsymmetric" or "conjugate-gradients" or { by = … }.
     control
-        As in `[run]`. Takes { load = … }.
+        Same as in `[run]`. Takes { load = … }.
     precision
-        As in `[run]`. Takes "single" or "double".
+        Same as in `[run]`. Takes "single" or "double".
     device
-        As in `[run]`. Takes one of "cpu", "gpu", "auto".
+        Same as in `[run]`. Takes one of "cpu", "gpu", "auto".
     adapter
-        As in `[run]`. Takes a text.
+        Same as in `[run]`. Takes a text.
     design
-        As in `[run]`. Takes one of "gather", "blocks", "float-atomics", "fast".
+        Same as in `[run]`. Takes one of "gather", "blocks", "float-atomics", "fast".
     """
 
     _type: ClassVar[str | None] = None
@@ -164,7 +164,7 @@ class NeoHookean(Table):
     poisson_ratio
         Poisson's ratio ν; soft tissue lies near 0.45 to 0.49. 0.5, a volume that never changes, is for membranes and shells. Takes a number, greater than -1 and at most 0.5.
     volumetric
-        How the energy grows with the change of volume. Takes one of "quadratic", "quad-log", "ln-squared", "j-ln-j"; "quadratic" if not given.
+        Form of the energy U(J) of a change of volume. Takes one of "quadratic", "quad-log", "ln-squared", "j-ln-j"; "quadratic" if not given.
     fibre
         Fibre direction at rest, for laws with fibres; a body may give its own. Takes 3 numbers, { cell-data = … }, { along = … }, { toward = … }, { around = … }, { tangential = … } or { laplace = … }.
     second_fibre
@@ -172,7 +172,7 @@ class NeoHookean(Table):
     prony
         Relaxation by Prony series; any number of terms on either part of the stress. Takes an array of tables; [] if not given.
     prony_update
-        How the relaxation advances over a step. Takes "exact" or "backward-euler"; "exact" if not given.
+        Update of the relaxation over a step. Takes "exact" or "backward-euler"; "exact" if not given.
     """
 
     _type: ClassVar[str | None] = "neo-hookean"
@@ -210,7 +210,7 @@ class CoupledNeoHookean(Table):
     prony
         Relaxation by Prony series; any number of terms on either part of the stress. Takes an array of tables; [] if not given.
     prony_update
-        How the relaxation advances over a step. Takes "exact" or "backward-euler"; "exact" if not given.
+        Update of the relaxation over a step. Takes "exact" or "backward-euler"; "exact" if not given.
     """
 
     _type: ClassVar[str | None] = "coupled-neo-hookean"
@@ -247,7 +247,7 @@ class LogarithmicNeoHookean(Table):
     prony
         Relaxation by Prony series; any number of terms on either part of the stress. Takes an array of tables; [] if not given.
     prony_update
-        How the relaxation advances over a step. Takes "exact" or "backward-euler"; "exact" if not given.
+        Update of the relaxation over a step. Takes "exact" or "backward-euler"; "exact" if not given.
     """
 
     _type: ClassVar[str | None] = "logarithmic-neo-hookean"
@@ -284,7 +284,7 @@ class StVenantKirchhoff(Table):
     prony
         Relaxation by Prony series; any number of terms on either part of the stress. Takes an array of tables; [] if not given.
     prony_update
-        How the relaxation advances over a step. Takes "exact" or "backward-euler"; "exact" if not given.
+        Update of the relaxation over a step. Takes "exact" or "backward-euler"; "exact" if not given.
     """
 
     _type: ClassVar[str | None] = "st-venant-kirchhoff"
@@ -321,7 +321,7 @@ class Corotational(Table):
     prony
         Relaxation by Prony series; any number of terms on either part of the stress. Takes an array of tables; [] if not given.
     prony_update
-        How the relaxation advances over a step. Takes "exact" or "backward-euler"; "exact" if not given.
+        Update of the relaxation over a step. Takes "exact" or "backward-euler"; "exact" if not given.
     """
 
     _type: ClassVar[str | None] = "corotational"
@@ -352,7 +352,7 @@ class MooneyRivlin(Table):
     poisson_ratio
         Poisson's ratio ν at rest; soft tissue lies near 0.45 to 0.49. 0.5, a volume that never changes, is for membranes and shells. Takes a number, greater than -1 and at most 0.5.
     volumetric
-        How the energy grows with the change of volume. Takes one of "quadratic", "quad-log", "ln-squared", "j-ln-j"; "quadratic" if not given.
+        Form of the energy U(J) of a change of volume. Takes one of "quadratic", "quad-log", "ln-squared", "j-ln-j"; "quadratic" if not given.
     fibre
         Fibre direction at rest, for laws with fibres; a body may give its own. Takes 3 numbers, { cell-data = … }, { along = … }, { toward = … }, { around = … }, { tangential = … } or { laplace = … }.
     second_fibre
@@ -360,7 +360,7 @@ class MooneyRivlin(Table):
     prony
         Relaxation by Prony series; any number of terms on either part of the stress. Takes an array of tables; [] if not given.
     prony_update
-        How the relaxation advances over a step. Takes "exact" or "backward-euler"; "exact" if not given.
+        Update of the relaxation over a step. Takes "exact" or "backward-euler"; "exact" if not given.
     """
 
     _type: ClassVar[str | None] = "mooney-rivlin"
@@ -398,7 +398,7 @@ class Polynomial(Table):
     poisson_ratio
         Poisson's ratio ν at rest; soft tissue lies near 0.45 to 0.49. 0.5, a volume that never changes, is for membranes and shells. Takes a number, greater than -1 and at most 0.5.
     volumetric
-        How the energy grows with the change of volume. Takes one of "quadratic", "quad-log", "ln-squared", "j-ln-j"; "quadratic" if not given.
+        Form of the energy U(J) of a change of volume. Takes one of "quadratic", "quad-log", "ln-squared", "j-ln-j"; "quadratic" if not given.
     fibre
         Fibre direction at rest, for laws with fibres; a body may give its own. Takes 3 numbers, { cell-data = … }, { along = … }, { toward = … }, { around = … }, { tangential = … } or { laplace = … }.
     second_fibre
@@ -406,7 +406,7 @@ class Polynomial(Table):
     prony
         Relaxation by Prony series; any number of terms on either part of the stress. Takes an array of tables; [] if not given.
     prony_update
-        How the relaxation advances over a step. Takes "exact" or "backward-euler"; "exact" if not given.
+        Update of the relaxation over a step. Takes "exact" or "backward-euler"; "exact" if not given.
     """
 
     _type: ClassVar[str | None] = "polynomial"
@@ -443,7 +443,7 @@ class Yeoh(Table):
     poisson_ratio
         Poisson's ratio ν at rest; soft tissue lies near 0.45 to 0.49. 0.5, a volume that never changes, is for membranes and shells. Takes a number, greater than -1 and at most 0.5.
     volumetric
-        How the energy grows with the change of volume. Takes one of "quadratic", "quad-log", "ln-squared", "j-ln-j"; "quadratic" if not given.
+        Form of the energy U(J) of a change of volume. Takes one of "quadratic", "quad-log", "ln-squared", "j-ln-j"; "quadratic" if not given.
     fibre
         Fibre direction at rest, for laws with fibres; a body may give its own. Takes 3 numbers, { cell-data = … }, { along = … }, { toward = … }, { around = … }, { tangential = … } or { laplace = … }.
     second_fibre
@@ -451,7 +451,7 @@ class Yeoh(Table):
     prony
         Relaxation by Prony series; any number of terms on either part of the stress. Takes an array of tables; [] if not given.
     prony_update
-        How the relaxation advances over a step. Takes "exact" or "backward-euler"; "exact" if not given.
+        Update of the relaxation over a step. Takes "exact" or "backward-euler"; "exact" if not given.
     """
 
     _type: ClassVar[str | None] = "yeoh"
@@ -484,7 +484,7 @@ class ArrudaBoyce(Table):
     poisson_ratio
         Poisson's ratio ν at rest; soft tissue lies near 0.45 to 0.49. 0.5, a volume that never changes, is for membranes and shells. Takes a number, greater than -1 and at most 0.5.
     volumetric
-        How the energy grows with the change of volume. Takes one of "quadratic", "quad-log", "ln-squared", "j-ln-j"; "quadratic" if not given.
+        Form of the energy U(J) of a change of volume. Takes one of "quadratic", "quad-log", "ln-squared", "j-ln-j"; "quadratic" if not given.
     fibre
         Fibre direction at rest, for laws with fibres; a body may give its own. Takes 3 numbers, { cell-data = … }, { along = … }, { toward = … }, { around = … }, { tangential = … } or { laplace = … }.
     second_fibre
@@ -492,7 +492,7 @@ class ArrudaBoyce(Table):
     prony
         Relaxation by Prony series; any number of terms on either part of the stress. Takes an array of tables; [] if not given.
     prony_update
-        How the relaxation advances over a step. Takes "exact" or "backward-euler"; "exact" if not given.
+        Update of the relaxation over a step. Takes "exact" or "backward-euler"; "exact" if not given.
     """
 
     _type: ClassVar[str | None] = "arruda-boyce"
@@ -524,7 +524,7 @@ class Gent(Table):
     poisson_ratio
         Poisson's ratio ν; soft tissue lies near 0.45 to 0.49. 0.5, a volume that never changes, is for membranes and shells. Takes a number, greater than -1 and at most 0.5.
     volumetric
-        How the energy grows with the change of volume. Takes one of "quadratic", "quad-log", "ln-squared", "j-ln-j"; "quadratic" if not given.
+        Form of the energy U(J) of a change of volume. Takes one of "quadratic", "quad-log", "ln-squared", "j-ln-j"; "quadratic" if not given.
     limit
         Limit Jₘ of Ī₁ − 3, where the tissue locks; under uniaxial stretch λ: λ² + 2/λ − 3. Takes a number, greater than 0.
     fibre
@@ -534,7 +534,7 @@ class Gent(Table):
     prony
         Relaxation by Prony series; any number of terms on either part of the stress. Takes an array of tables; [] if not given.
     prony_update
-        How the relaxation advances over a step. Takes "exact" or "backward-euler"; "exact" if not given.
+        Update of the relaxation over a step. Takes "exact" or "backward-euler"; "exact" if not given.
     """
 
     _type: ClassVar[str | None] = "gent"
@@ -567,7 +567,7 @@ class Demiray(Table):
     poisson_ratio
         Poisson's ratio ν; soft tissue lies near 0.45 to 0.49. 0.5, a volume that never changes, is for membranes and shells. Takes a number, greater than -1 and at most 0.5.
     volumetric
-        How the energy grows with the change of volume. Takes one of "quadratic", "quad-log", "ln-squared", "j-ln-j"; "quadratic" if not given.
+        Form of the energy U(J) of a change of volume. Takes one of "quadratic", "quad-log", "ln-squared", "j-ln-j"; "quadratic" if not given.
     exponent
         Exponent b. Takes a number, greater than 0.
     fibre
@@ -577,7 +577,7 @@ class Demiray(Table):
     prony
         Relaxation by Prony series; any number of terms on either part of the stress. Takes an array of tables; [] if not given.
     prony_update
-        How the relaxation advances over a step. Takes "exact" or "backward-euler"; "exact" if not given.
+        Update of the relaxation over a step. Takes "exact" or "backward-euler"; "exact" if not given.
     """
 
     _type: ClassVar[str | None] = "demiray"
@@ -610,7 +610,7 @@ class VerondaWestmann(Table):
     poisson_ratio
         Poisson's ratio ν at rest; soft tissue lies near 0.45 to 0.49. 0.5, a volume that never changes, is for membranes and shells. Takes a number, greater than -1 and at most 0.5.
     volumetric
-        How the energy grows with the change of volume. Takes one of "quadratic", "quad-log", "ln-squared", "j-ln-j"; "quadratic" if not given.
+        Form of the energy U(J) of a change of volume. Takes one of "quadratic", "quad-log", "ln-squared", "j-ln-j"; "quadratic" if not given.
     fibre
         Fibre direction at rest, for laws with fibres; a body may give its own. Takes 3 numbers, { cell-data = … }, { along = … }, { toward = … }, { around = … }, { tangential = … } or { laplace = … }.
     second_fibre
@@ -618,7 +618,7 @@ class VerondaWestmann(Table):
     prony
         Relaxation by Prony series; any number of terms on either part of the stress. Takes an array of tables; [] if not given.
     prony_update
-        How the relaxation advances over a step. Takes "exact" or "backward-euler"; "exact" if not given.
+        Update of the relaxation over a step. Takes "exact" or "backward-euler"; "exact" if not given.
     """
 
     _type: ClassVar[str | None] = "veronda-westmann"
@@ -648,7 +648,7 @@ class Ogden(Table):
     poisson_ratio
         Poisson's ratio ν at rest; soft tissue lies near 0.45 to 0.49. 0.5, a volume that never changes, is for membranes and shells. Takes a number, greater than -1 and at most 0.5.
     volumetric
-        How the energy grows with the change of volume. Takes one of "quadratic", "quad-log", "ln-squared", "j-ln-j"; "quadratic" if not given.
+        Form of the energy U(J) of a change of volume. Takes one of "quadratic", "quad-log", "ln-squared", "j-ln-j"; "quadratic" if not given.
     fibre
         Fibre direction at rest, for laws with fibres; a body may give its own. Takes 3 numbers, { cell-data = … }, { along = … }, { toward = … }, { around = … }, { tangential = … } or { laplace = … }.
     second_fibre
@@ -656,7 +656,7 @@ class Ogden(Table):
     prony
         Relaxation by Prony series; any number of terms on either part of the stress. Takes an array of tables; [] if not given.
     prony_update
-        How the relaxation advances over a step. Takes "exact" or "backward-euler"; "exact" if not given.
+        Update of the relaxation over a step. Takes "exact" or "backward-euler"; "exact" if not given.
     """
 
     _type: ClassVar[str | None] = "ogden"
@@ -687,7 +687,7 @@ class TransverselyIsotropic(Table):
     poisson_ratio
         Poisson's ratio ν; soft tissue lies near 0.45 to 0.49. 0.5, a volume that never changes, is for membranes and shells. Takes a number, greater than -1 and at most 0.5.
     volumetric
-        How the energy grows with the change of volume. Takes one of "quadratic", "quad-log", "ln-squared", "j-ln-j"; "quadratic" if not given.
+        Form of the energy U(J) of a change of volume. Takes one of "quadratic", "quad-log", "ln-squared", "j-ln-j"; "quadratic" if not given.
     fibre_modulus
         Fibre modulus η [Pa]. Takes a number, at least 0.
     convention
@@ -699,7 +699,7 @@ class TransverselyIsotropic(Table):
     prony
         Relaxation by Prony series; any number of terms on either part of the stress. Takes an array of tables; [] if not given.
     prony_update
-        How the relaxation advances over a step. Takes "exact" or "backward-euler"; "exact" if not given.
+        Update of the relaxation over a step. Takes "exact" or "backward-euler"; "exact" if not given.
     """
 
     _type: ClassVar[str | None] = "transversely-isotropic"
@@ -733,7 +733,7 @@ class Orthotropic(Table):
     poisson_ratio
         Poisson's ratio ν; soft tissue lies near 0.45 to 0.49. 0.5, a volume that never changes, is for membranes and shells. Takes a number, greater than -1 and at most 0.5.
     volumetric
-        How the energy grows with the change of volume. Takes one of "quadratic", "quad-log", "ln-squared", "j-ln-j"; "quadratic" if not given.
+        Form of the energy U(J) of a change of volume. Takes one of "quadratic", "quad-log", "ln-squared", "j-ln-j"; "quadratic" if not given.
     e4
         Modulus e₄ of the first family, on Ī₄ − 1 [Pa]. Takes a number, at least 0; 0.0 if not given.
     e5
@@ -749,7 +749,7 @@ class Orthotropic(Table):
     prony
         Relaxation by Prony series; any number of terms on either part of the stress. Takes an array of tables; [] if not given.
     prony_update
-        How the relaxation advances over a step. Takes "exact" or "backward-euler"; "exact" if not given.
+        Update of the relaxation over a step. Takes "exact" or "backward-euler"; "exact" if not given.
     """
 
     _type: ClassVar[str | None] = "orthotropic"
@@ -785,7 +785,7 @@ class HolzapfelGasserOgden(Table):
     poisson_ratio
         Poisson's ratio ν; soft tissue lies near 0.45 to 0.49. 0.5, a volume that never changes, is for membranes and shells. Takes a number, greater than -1 and at most 0.5.
     volumetric
-        How the energy grows with the change of volume. Takes one of "quadratic", "quad-log", "ln-squared", "j-ln-j"; "quadratic" if not given.
+        Form of the energy U(J) of a change of volume. Takes one of "quadratic", "quad-log", "ln-squared", "j-ln-j"; "quadratic" if not given.
     fibre_modulus
         Fibre modulus k₁ [Pa]. Takes a number, at least 0.
     fibre_exponent
@@ -801,7 +801,7 @@ class HolzapfelGasserOgden(Table):
     prony
         Relaxation by Prony series; any number of terms on either part of the stress. Takes an array of tables; [] if not given.
     prony_update
-        How the relaxation advances over a step. Takes "exact" or "backward-euler"; "exact" if not given.
+        Update of the relaxation over a step. Takes "exact" or "backward-euler"; "exact" if not given.
     """
 
     _type: ClassVar[str | None] = "holzapfel-gasser-ogden"
@@ -839,7 +839,7 @@ class FungOrthotropic(Table):
     bulk_modulus
         Modulus κ of the volumetric energy U(J) [Pa]; the exponential adds to the bulk modulus. Takes a number, greater than 0.
     volumetric
-        How the energy U grows with the change of volume. Takes one of "quadratic", "quad-log", "ln-squared", "j-ln-j"; "quadratic" if not given.
+        Form of the energy U(J) of a change of volume. Takes one of "quadratic", "quad-log", "ln-squared", "j-ln-j"; "quadratic" if not given.
     fibre
         Fibre direction at rest, for laws with fibres; a body may give its own. Takes 3 numbers, { cell-data = … }, { along = … }, { toward = … }, { around = … }, { tangential = … } or { laplace = … }.
     second_fibre
@@ -847,7 +847,7 @@ class FungOrthotropic(Table):
     prony
         Relaxation by Prony series; any number of terms on either part of the stress. Takes an array of tables; [] if not given.
     prony_update
-        How the relaxation advances over a step. Takes "exact" or "backward-euler"; "exact" if not given.
+        Update of the relaxation over a step. Takes "exact" or "backward-euler"; "exact" if not given.
     """
 
     _type: ClassVar[str | None] = "fung-orthotropic"
@@ -872,41 +872,41 @@ class Body(Table):
     Parameters
     ----------
     model
-        How it is modelled; if not given, `solid`, or `membrane` with `on`. With the solvers `explicit` and `quasi-static` shells are a participant of their own (`[participant.NAME]`). Takes one of "solid", "shell", "membrane", "bar"; "solid" if not given.
+        Model of the body; if not given, `solid`, or `membrane` with `on`. With the solvers `explicit` and `quasi-static` shells are a participant of their own (`[participant.NAME]`). Takes one of "solid", "shell", "membrane", "bar"; "solid" if not given.
     mesh
-        Its mesh, from a file, a built-in shape, or a segmented image. The mesh of a shell or a membrane is of triangles (quads are cut into two); a volume mesh gives it its boundary. That of bars is of lines. Takes a table.
+        Its mesh, from a file, a built-in shape, or a segmented image. The mesh of a shell or a membrane is of triangles (quads are cut into two); of a volume mesh it takes the boundary. The mesh of bars is of lines. Takes a table.
     on
         Instead of a mesh: the body on whose boundary this one is a wall, with the same nodes, as the capsule of an organ. Takes a text.
     faces
-        The faces of that boundary that are the wall; if not given, all of it. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
+        The faces of that boundary that are the wall; if not given, all faces. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
     rotations
-        What the rotations of a shell do that is a wall with `on`. Takes "free" or "follow"; "free" if not given.
+        Behaviour of the rotations of a shell that is a wall with `on`. Takes "free" or "follow"; "free" if not given.
     element
         The element; if not given, `tet4` for tets, `hex8` for hexes and `dkt-curved` for shells; `model = "membrane"` has one only. For soft tissue prefer `tet4-anp` to `tet4`. Takes one of "tet4", "tet4-anp", "tet4-ianp", "tet4-ianp-niftysim", "hex8", "hex8-full", "dkt-curved", "dkt-opt", "dkt-cst", "membrane", "plate", "comas-2010".
     law
         The name of its law, or a law for each cell label, by number or by the name of the label: `{ 1 = "soft", tumour = "stiff" }`. Shells and bars take the moduli of an isotropic law at small strain; a shell whose `layers` all have their own elasticity needs none. Takes a text or a table of texts; {} if not given.
     density
-        Mass per volume [kg/m³], or one for each cell label, as of `law`. Elements with averaged pressure average it apart on parts of different density. Takes a number or a table of numbers, greater than 0.
+        Mass per volume [kg/m³], or one for each cell label, as for `law`. Elements with averaged pressure average it separately on parts of different density. Takes a number or a table of numbers, greater than 0.
     thickness
         Thickness of a shell or a membrane [m]: one, or one for each triangle. Takes a number, { cell-data = … } or { by-label = … }, greater than 0.
     layers
         Layers of a shell from the side that its triangles face away from to the side that they face, instead of a `thickness`. Their angles count from `fibre`, projected on each triangle. Takes an array of tables.
     pre_tension
-        Tension [N/m] of a shell in the shape of its mesh, equal in all directions: what holds a flat `membrane` across. Not for the element `plate`. Takes a number, at least 0; 0.0 if not given.
+        Tension [N/m] of a shell in the shape of its mesh, equal in all directions: it holds a flat `membrane` across its plane. Not for the element `plate`. Takes a number, at least 0; 0.0 if not given.
     normals
-        Where the normals at rest of a shell come from, which make its surface curved; if not given, from the mesh where it has some, as built-in shapes have, and there is no `crease`, else from the triangles. Takes "mesh" or "triangles".
+        Source of the normals at rest of a shell, which make its surface curved. If not given, the mesh, if it has normals (built-in shapes have) and there is no `crease`; else the triangles. Takes "mesh" or "triangles".
     crease
         Angle [degrees] between triangles of a shell above which their edge is a crease, where the curved surface has a kink; 45 if not given. Not with the normals of a mesh. Takes a number, at least 0 and at most 180.
     branches
-        Whether more than two triangles of a shell may meet in an edge. Takes true or false; false if not given.
+        True if more than two triangles of a shell may meet in an edge. Takes true or false; false if not given.
     fraction
-        The name of a cell-data array of the mesh with the part of each cell that the body fills, above 0 and at most 1: its stiffness and mass are so much smaller, but never less than a tenth. If not given, `fraction` of `immersed-hexes`. Takes a text.
+        Name of a cell-data array of the mesh with the part of each cell that the body fills, above 0 and at most 1. The part scales the stiffness and mass of the cell, but never below a tenth. If not given, `fraction` of `immersed-hexes`. Takes a text.
     area
         Cross section of bars [m²]. Takes a number, greater than 0.
     slack
-        Length of bars without force over that in the mesh: above 1 they hang through at the start, below 1 they pull. Takes a number, at least 0.1 and at most 10; 1.0 if not given.
+        Length of bars without force over their length in the mesh: above 1 they are slack at the start, below 1 they pull. Takes a number, at least 0.1 and at most 10; 1.0 if not given.
     tension_only
-        Whether bars take no compression, as threads. Takes true or false; false if not given.
+        True if bars take no compression, as threads. Takes true or false; false if not given.
     damping
         Mass-proportional damping [1/s]. Takes a number, at least 0; 0.0 if not given.
     stiffness_damping
@@ -916,11 +916,11 @@ class Body(Table):
     velocity
         Velocity [m/s] at the start, of all nodes that no constraint holds or moves; not for quasi-static runs. Takes 3 numbers.
     initial_displacement
-        Displacement [m] of each node from rest at the start, of shells, and of solids with the solvers `implicit` and `static`; the nodes of shells turn with the triangles round them. The mesh is the shape at rest. Takes { point-data = … } or { csv = … }.
+        Displacement [m] of each node from rest at the start. The mesh is the shape at rest. For shells, whose nodes turn with the triangles around them, and for solids with the solvers `implicit` and `static`. Takes { point-data = … } or { csv = … }.
     fibre
-        Fibre direction at rest; overrides that of the law. Of a shell, the direction that the angles of its `layers` count from. Takes 3 numbers, { cell-data = … }, { along = … }, { toward = … }, { around = … }, { tangential = … } or { laplace = … }.
+        Fibre direction at rest; overrides the direction of the law. For a shell, the direction from which the angles of its `layers` count. Takes 3 numbers, { cell-data = … }, { along = … }, { toward = … }, { around = … }, { tangential = … } or { laplace = … }.
     second_fibre
-        Direction of the second family of fibres at rest; overrides that of the law. Takes 3 numbers, { cell-data = … }, { along = … }, { toward = … }, { around = … }, { tangential = … } or { laplace = … }.
+        Direction of the second family of fibres at rest; overrides the direction of the law. Takes 3 numbers, { cell-data = … }, { along = … }, { toward = … }, { around = … }, { tangential = … } or { laplace = … }.
     """
 
     _type: ClassVar[str | None] = None
@@ -955,20 +955,20 @@ class Body(Table):
 
 @dataclass(frozen=True, kw_only=True)
 class Tie(Table):
-    """`[tie.NAME]`. Ties the nodes of one body to another body, whose mesh need not match: they follow nodes of the other, and their forces and masses go there. For vessels inside an organ, walls on a surface, parts that are glued. Bodies of two participants are tied by springs, as stiff as their steps allow.
+    """`[tie.NAME]`. Ties the nodes of one body to another body, whose mesh need not match. The tied nodes follow nodes of the other body, which take their forces and masses. For vessels inside an organ, walls on a surface, parts that are glued. Bodies of two participants are tied by springs, as stiff as their steps allow.
 
     Parameters
     ----------
     between
         The body whose nodes follow, and the body that they follow: `between = ["vessels", "liver"]`. With `points`, take the finer or the softer one first. Takes 2 texts.
     method
-        How nodes follow. If not given, `mortar` where faces of one solid lie on those of another one, and `points` elsewhere: walls, bars, a solid inside another one, and gaps wider than the default `tolerance`. Takes "mortar" or "points".
+        Method by which nodes follow. If not given, `mortar` where faces of one solid lie on faces of another solid. Elsewhere `points`: for walls, bars, a solid inside another one, and gaps wider than the default `tolerance`. Takes "mortar" or "points".
     nodes
         The nodes of the first body that follow; if not given, all inside or on the second. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
     tolerance
-        Largest distance of such a node from the second body [m]; if not given, a tenth of its median edge. Takes a number, at least 0.
+        Largest distance of a tied node from the second body [m]; if not given, a tenth of its median edge. Takes a number, at least 0.
     rotations
-        What the rotations of tied nodes of a shell do, with the solvers `implicit` and `static`. Takes "free" or "follow"; "free" if not given.
+        Behaviour of the rotations of tied nodes of a shell, with the solvers `implicit` and `static`. Takes "free" or "follow"; "free" if not given.
     """
 
     _type: ClassVar[str | None] = None
@@ -990,7 +990,7 @@ class Surface(Table):
     on
         The body that carries it. Takes a text.
     mesh
-        The surface: triangles or quads of a file, the boundary of a built-in shape, or of an image its boundary or, with `as = "surface"`, its smooth surface. Takes a table.
+        The surface: triangles or quads of a file, or the boundary of a built-in shape or an image. With `as = "surface"`, the smooth surface of an image. Takes a table.
     """
 
     _type: ClassVar[str | None] = None
@@ -1009,7 +1009,7 @@ class Fix(Table):
     body
         The body. Takes a text.
     nodes
-        Which nodes. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
+        Selected nodes. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
     components
         Components held; if not given, all: of shells also the rotations, which clamps them. Takes an array of texts ("x", "y", "z", "rx", "ry" or "rz").
     """
@@ -1031,7 +1031,7 @@ class Move(Table):
     body
         The body. Takes a text.
     nodes
-        Which nodes. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
+        Selected nodes. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
     by
         Displacement [m], reached along the curve: one for all nodes, or one for each node from a file. Takes 3 numbers, { point-data = … } or { csv = … }.
     velocity
@@ -1043,7 +1043,7 @@ class Move(Table):
     components
         Components prescribed; if not given, all three of the displacement, and with `turn` the rotations. A rotation takes all three. Takes an array of texts ("x", "y", "z", "rx", "ry" or "rz").
     force_limit
-        The force [N] that they push with at most, as their reaction tells. From half of it on they give way together, and lag behind their motion; when nothing is in their way any more, they catch up. With the solvers `implicit` and `static`. Takes a number, greater than 0.
+        Largest force [N] with which they push, measured by their reaction. From half of this force on they give way together, and lag behind their motion. When the obstacle is gone, they catch up. With the solvers `implicit` and `static`. Takes a number, greater than 0.
     curve
         The form of the growth. Takes "ramp", "smooth-step", "polynomial-10-15-6" or "hold", { wave = … } or { table = … }.
     from_
@@ -1077,7 +1077,7 @@ class Spring(Table):
     body
         The body. Takes a text.
     nodes
-        Which nodes. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
+        Selected nodes. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
     stiffness
         Stiffness of the spring of each node [N/m]. Takes a number, greater than 0.
     to
@@ -1095,18 +1095,18 @@ class Spring(Table):
 
 @dataclass(frozen=True, kw_only=True)
 class Mean(Table):
-    """`[constraint.NAME]` with ``type = "mean"``. Nodes whose mean displacement is prescribed, each of them free by itself: a face under a plate that tilts. Weighted by the area of the boundary at each node where the nodes have whole faces, else equally. Its reaction is the force of the plate. With every solver on the CPU but explicit shells.
+    """`[constraint.NAME]` with ``type = "mean"``. Nodes whose mean displacement is prescribed, while each node is free: a face under a plate that tilts. If the nodes have whole faces, the mean is weighted by the area of the boundary at each node; otherwise all nodes count equally. The reaction is the force of the plate. With every solver on the CPU except explicit shells.
 
     Parameters
     ----------
     body
         The body. Takes a text.
     nodes
-        Which nodes. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
+        Selected nodes. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
     by
         Mean displacement [m], reached along the curve. Takes 3 numbers.
     components
-        Components of it that are prescribed; if not given, all three. Takes an array of texts ("x", "y", "z", "rx", "ry" or "rz").
+        Components that are prescribed; if not given, all three. Takes an array of texts ("x", "y", "z", "rx", "ry" or "rz").
     curve
         The form of the growth. Takes "ramp", "smooth-step", "polynomial-10-15-6" or "hold", { wave = … } or { table = … }.
     from_
@@ -1129,14 +1129,14 @@ class Mean(Table):
 
 @dataclass(frozen=True, kw_only=True)
 class Rigid(Table):
-    """`[constraint.NAME]` with ``type = "rigid"``. A rigid part of a body, such as bone or an implant: its nodes keep their distances, and move and turn together, free in space; those of shells turn with it. With every solver on the CPU but explicit shells.
+    """`[constraint.NAME]` with ``type = "rigid"``. A rigid part of a body, such as bone or an implant: its nodes keep their distances, and move and turn together, free in space. The rotations of shell nodes turn with the part. With every solver on the CPU except explicit shells.
 
     Parameters
     ----------
     body
         The body. Takes a text.
     nodes
-        Which nodes. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
+        Selected nodes. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
     """
 
     _type: ClassVar[str | None] = "rigid"
@@ -1148,18 +1148,18 @@ class Rigid(Table):
 
 @dataclass(frozen=True, kw_only=True)
 class Volume(Table):
-    """`[constraint.NAME]` with ``type = "volume"``. A closed surface whose volume is prescribed by a uniform pressure within, however large: a balloon, an eye, a full bladder. Columns `volume.NAME` [m³] and `pressure.NAME` [Pa] of tables tell both. With every solver on the CPU but explicit shells.
+    """`[constraint.NAME]` with ``type = "volume"``. A closed surface whose volume is prescribed by a uniform pressure within, however large: a balloon, an eye, a full bladder. Columns `volume.NAME` [m³] and `pressure.NAME` [Pa] of tables record both. With every solver on the CPU except explicit shells.
 
     Parameters
     ----------
     body
         The body, a solid, a membrane or a shell. Takes a text.
     faces
-        Which of its faces; if not given, all of its boundary. They close, and may be those of a cavity. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
+        Faces of the surface; if not given, the whole boundary. They have to be closed, and may be the faces of a cavity. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
     by
-        By how much the enclosed volume grows from that at rest [m³], along the curve; 0 keeps it, less than 0 empties it. Takes a number.
+        Growth of the enclosed volume from rest [m³], along the curve; 0 keeps the volume, less than 0 empties it. Takes a number.
     pressure_limit
-        The pressure [Pa] that it takes at most, of suction likewise. There the volume lags behind its curve; when less is needed, it catches up. With the solvers `implicit` and `static`. Takes a number, greater than 0.
+        Largest pressure or suction [Pa]. At this pressure the volume lags behind its curve; when less is needed, it catches up. With the solvers `implicit` and `static`. Takes a number, greater than 0.
     curve
         The form of the growth. Takes "ramp", "smooth-step", "polynomial-10-15-6" or "hold", { wave = … } or { table = … }.
     from_
@@ -1189,7 +1189,7 @@ class Force(Table):
     on
         The body or the carried surface. Takes a text.
     nodes
-        Which nodes. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
+        Selected nodes. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
     each
         Force on each node [N]: the same for all, or one for each node of a body from a file. Takes 3 numbers, { point-data = … } or { csv = … }.
     total
@@ -1223,7 +1223,7 @@ class Moment(Table):
     on
         The body. Takes a text.
     nodes
-        Which nodes. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
+        Selected nodes. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
     each
         Moment on each node [N m]. Takes 3 numbers.
     total
@@ -1250,14 +1250,14 @@ class Moment(Table):
 
 @dataclass(frozen=True, kw_only=True)
 class Edge(Table):
-    """`[load.NAME]` with ``type = "edge"``. A force per length on edges of shells, of triangles both of whose ends are selected and which only one triangle has. Curve: `smooth-step` if not given.
+    """`[load.NAME]` with ``type = "edge"``. A force per length on edges of shells that only one triangle has and whose ends are both selected. Curve: `smooth-step` if not given.
 
     Parameters
     ----------
     on
         The body. Takes a text.
     nodes
-        Which nodes. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
+        Selected nodes. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
     traction
         Force per length at rest [N/m]; its direction stays. Takes 3 numbers.
     curve
@@ -1288,7 +1288,7 @@ class Traction(Table):
     on
         The body or the carried surface. Takes a text.
     faces
-        Which faces: those with all nodes selected. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
+        Faces whose nodes are all selected. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
     traction
         Force per area at rest [Pa]; its direction stays. Takes 3 numbers.
     curve
@@ -1312,18 +1312,18 @@ class Traction(Table):
 
 @dataclass(frozen=True, kw_only=True)
 class Pressure(Table):
-    """`[load.NAME]` with ``type = "pressure"``. Pressure on faces that follows them as they deform. Curve: `smooth-step` if not given.
+    """`[load.NAME]` with ``type = "pressure"``. Pressure on faces, which follows the faces as they deform. Curve: `smooth-step` if not given.
 
     Parameters
     ----------
     on
         The body or the carried surface. Takes a text.
     faces
-        Which faces: those with all nodes selected. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
+        Faces whose nodes are all selected. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
     pressure
-        Pressure [Pa]; positive pushes a solid inwards, and a shell to the side that its triangles face (a closed one that faces outwards is blown up). Takes a number.
+        Pressure [Pa]; positive pushes a solid inwards, and a shell to the side that its triangles face. A closed shell that faces outwards is blown up. Takes a number.
     spread
-        How it comes to the nodes of a shell; if not given, `curved` with `dkt-curved` and `lumped` with other elements. Only these pairs go together. Takes "lumped" or "curved".
+        Distribution of the pressure to the nodes of a shell. If not given, `curved` with `dkt-curved` and `lumped` with other elements. Other pairs are not possible. Takes "lumped" or "curved".
     curve
         The form of the growth. Takes "ramp", "smooth-step", "polynomial-10-15-6" or "hold", { wave = … } or { table = … }.
     from_
@@ -1353,7 +1353,7 @@ class Gravity(Table):
     on
         The body; if not given, all. Takes a text.
     nodes
-        Which nodes of the body; if not given, all. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
+        Nodes of the body; if not given, all nodes. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
     acceleration
         Acceleration [m/s²]. Takes 3 numbers.
     curve
@@ -1377,32 +1377,32 @@ class Gravity(Table):
 
 @dataclass(frozen=True, kw_only=True)
 class Obstacle(Table):
-    """`[obstacle.NAME]`. A rigid thing that bodies touch: an obstacle such as a bone, or a tool. It stands where `at` and `turn` put it, and moves by one of `by`, `rotate` and `poses`, or not at all. Curve: `smooth-step` if not given. What touches it is named by `[contact.NAME]`.
+    """`[obstacle.NAME]`. A rigid thing that bodies touch: an obstacle such as a bone, or a tool. `at` and `turn` set its pose; it moves by one of `by`, `rotate` and `poses`, or not at all. Curve: `smooth-step` if not given. `[contact.NAME]` names the bodies that touch it.
 
     Parameters
     ----------
     shape
         Its shape, around the origin of its own frame. Takes { sphere = … }, { capsule = … }, { cylinder = … }, { box = … }, { cone = … }, "half-space", { revolved = … }, { jaws = … }, { mesh = … } or { image = … }.
     at
-        Where the origin of its frame is [m]. Takes 3 numbers; [0.0,0.0,0.0] if not given.
+        Position of the origin of its frame [m]. Takes 3 numbers; [0.0,0.0,0.0] if not given.
     turn
-        How its frame is turned [rad]: about the axis of this vector by its length. Takes 3 numbers; [0.0,0.0,0.0] if not given.
+        Rotation of its frame [rad]: about the axis of this vector, by its length. Takes 3 numbers; [0.0,0.0,0.0] if not given.
     inside
-        True if bodies are inside of it, as a brain in its skull. Takes true or false; false if not given.
+        True if bodies are inside, as a brain in its skull. Takes true or false; false if not given.
     opening
-        How far the jaws are open over time, of a tool with jaws; closed if not given. Takes a table.
+        Opening of the jaws over time, for a tool with jaws; closed if not given. Takes a table.
     ideal_grip
-        The angle [rad] between jaws from which on down they hold all that touches their inner faces, as if tied; they let go where they open wider. If not given, they hold by the contact's friction. Takes a number, at least 0.
+        The angle [rad] between jaws at or below which they hold everything that touches their inner faces, as if tied. They let go when they open wider. If not given, they hold by the contact's friction. Takes a number, at least 0.
     force_limit
-        The force [N] that it pushes with at most. From half of it on it gives way, and lags behind its trajectory; when nothing is in its way any more, it catches up. Takes a number, greater than 0.
+        Largest force [N] with which it pushes. From half of this force on it gives way, and lags behind its trajectory. When the obstacle is gone, it catches up. Takes a number, greater than 0.
     grows
-        By how much it grows over time. Takes { by = … }.
+        Growth over time. Takes { by = … }.
     by
         Displacement [m], reached along the curve. Takes 3 numbers.
     rotate
         Rotation about an axis, reached along the curve. Takes { axis = …, centre = … }.
     poses
-        A CSV file of poses: a row for each time [s] with a position [m] and a unit quaternion, columns t, x, y, z, qw, qx, qy, qz. In between it moves on straight ways and shortest arcs; before the first and after the last row it rests. Takes a text.
+        A CSV file of poses. A row for each time [s] has a position [m] and a unit quaternion, in columns t, x, y, z, qw, qx, qy, qz. Between rows it moves on straight lines and shortest arcs; before the first and after the last row it rests. Takes a text.
     curve
         The form of the growth. Takes "ramp", "smooth-step", "polynomial-10-15-6" or "hold", { wave = … } or { table = … }.
     from_
@@ -1432,32 +1432,32 @@ class Obstacle(Table):
 
 @dataclass(frozen=True, kw_only=True)
 class Tool(Table):
-    """`[tool.NAME]`. A rigid thing that bodies touch: an obstacle such as a bone, or a tool. It stands where `at` and `turn` put it, and moves by one of `by`, `rotate` and `poses`, or not at all. Curve: `smooth-step` if not given. What touches it is named by `[contact.NAME]`.
+    """`[tool.NAME]`. A rigid thing that bodies touch: an obstacle such as a bone, or a tool. `at` and `turn` set its pose; it moves by one of `by`, `rotate` and `poses`, or not at all. Curve: `smooth-step` if not given. `[contact.NAME]` names the bodies that touch it.
 
     Parameters
     ----------
     shape
         Its shape, around the origin of its own frame. Takes { sphere = … }, { capsule = … }, { cylinder = … }, { box = … }, { cone = … }, "half-space", { revolved = … }, { jaws = … }, { mesh = … } or { image = … }.
     at
-        Where the origin of its frame is [m]. Takes 3 numbers; [0.0,0.0,0.0] if not given.
+        Position of the origin of its frame [m]. Takes 3 numbers; [0.0,0.0,0.0] if not given.
     turn
-        How its frame is turned [rad]: about the axis of this vector by its length. Takes 3 numbers; [0.0,0.0,0.0] if not given.
+        Rotation of its frame [rad]: about the axis of this vector, by its length. Takes 3 numbers; [0.0,0.0,0.0] if not given.
     inside
-        True if bodies are inside of it, as a brain in its skull. Takes true or false; false if not given.
+        True if bodies are inside, as a brain in its skull. Takes true or false; false if not given.
     opening
-        How far the jaws are open over time, of a tool with jaws; closed if not given. Takes a table.
+        Opening of the jaws over time, for a tool with jaws; closed if not given. Takes a table.
     ideal_grip
-        The angle [rad] between jaws from which on down they hold all that touches their inner faces, as if tied; they let go where they open wider. If not given, they hold by the contact's friction. Takes a number, at least 0.
+        The angle [rad] between jaws at or below which they hold everything that touches their inner faces, as if tied. They let go when they open wider. If not given, they hold by the contact's friction. Takes a number, at least 0.
     force_limit
-        The force [N] that it pushes with at most. From half of it on it gives way, and lags behind its trajectory; when nothing is in its way any more, it catches up. Takes a number, greater than 0.
+        Largest force [N] with which it pushes. From half of this force on it gives way, and lags behind its trajectory. When the obstacle is gone, it catches up. Takes a number, greater than 0.
     grows
-        By how much it grows over time. Takes { by = … }.
+        Growth over time. Takes { by = … }.
     by
         Displacement [m], reached along the curve. Takes 3 numbers.
     rotate
         Rotation about an axis, reached along the curve. Takes { axis = …, centre = … }.
     poses
-        A CSV file of poses: a row for each time [s] with a position [m] and a unit quaternion, columns t, x, y, z, qw, qx, qy, qz. In between it moves on straight ways and shortest arcs; before the first and after the last row it rests. Takes a text.
+        A CSV file of poses. A row for each time [s] has a position [m] and a unit quaternion, in columns t, x, y, z, qw, qx, qy, qz. Between rows it moves on straight lines and shortest arcs; before the first and after the last row it rests. Takes a text.
     curve
         The form of the growth. Takes "ramp", "smooth-step", "polynomial-10-15-6" or "hold", { wave = … } or { table = … }.
     from_
@@ -1487,34 +1487,34 @@ class Tool(Table):
 
 @dataclass(frozen=True, kw_only=True)
 class Contact(Table):
-    """`[contact.NAME]`. Who touches whom: a body an obstacle or a tool, another body, or itself. With the solver `explicit`, for bodies without bending, impulses keep surfaces apart; bodies that touch each other are solids. With the solvers `implicit` and `static`, for solids and shells, a barrier does. Only barriers exclude intersections: no state that is accepted has one. The force on the second is in `csv` outputs as `contact.NAME`.
+    """`[contact.NAME]`. Contact of a body with an obstacle or a tool, with another body, or with itself. With the solver `explicit`, for bodies without bending, impulses keep surfaces apart; only solids can touch each other. With the solvers `implicit` and `static`, for solids and shells, a barrier keeps surfaces apart. Only barriers exclude intersections: no accepted state has an intersection. `csv` outputs have the force on the second body as `contact.NAME`.
 
     Parameters
     ----------
     between
-        The body, and what it touches: `between = ["liver", "probe"]`. The same body twice: itself. `"all"`: all solids, obstacles and tools; with the solvers `implicit` and `static` also shells and membranes that are not `on` a solid. Each pair has an entry of its own, `contact.NAME.liver-probe`. Takes 2 texts.
+        The body, and the thing that it touches: `between = ["liver", "probe"]`. The same body twice means self-contact. `"all"`: all solids, obstacles and tools; with the solvers `implicit` and `static` also shells and membranes that are not `on` a solid. Each pair has an entry of its own, `contact.NAME.liver-probe`. Takes 2 texts.
     faces
-        The faces of the first that touch; if not given, all of its boundary. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
+        Faces of the first body that touch; if not given, its whole boundary. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
     other_faces
-        The faces of the second, if that is another body; if not given, all of its boundary. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
+        Faces of the second, if it is another body; if not given, its whole boundary. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
     friction
         Coulomb's coefficient of friction [1]. Takes a number, at least 0; 0.0 if not given.
     thickness
-        Distance [m] that the surfaces keep. If not given: with the solver `explicit` 0.5 % of the mean edge between two bodies and of a body with itself, 0 from a rigid thing; with the solvers `implicit` and `static` half of the thickness of each shell that takes part. Nodes of explicit bodies that are nearer at the start keep the distance that they have. Takes a number, at least 0.
+        Distance [m] that the surfaces keep. If not given with the solver `explicit`, 0.5 % of the mean edge for bodies and self-contact, and 0 from a rigid thing. If not given with the solvers `implicit` and `static`, half of the thickness of each shell that takes part. Nodes of explicit bodies that are nearer at the start keep their distance. Takes a number, at least 0.
     barrier_distance
-        The gap [m], in addition to `thickness`, below which surfaces push each other away, with the solvers `implicit` and `static`; a thousandth of the diagonal of all bodies if not given. Takes a number, greater than 0.
+        The gap [m], in addition to `thickness`, below which surfaces push each other away. A thousandth of the diagonal of all bodies if not given. With the solvers `implicit` and `static`. Takes a number, greater than 0.
     barrier_stiffness
-        Stiffness κ [Pa] of the barrier: at the gap y times its distance it presses by κ (2 (y − 1) ln y + (y − 1)²/y). A tenth of Young's modulus of the softest body of the contact if not given. Takes a number, greater than 0.
+        Stiffness κ [Pa] of the barrier. At the gap y times its distance, its pressure is κ (2 (y − 1) ln y + (y − 1)²/y). A tenth of Young's modulus of the softest body of the contact if not given. Takes a number, greater than 0.
     subdivision
-        How often each triangle of a shell is divided into four on its curved surface, which touches in its place: 0, flat triangles, 1 or 2. With the solvers `implicit` and `static`. Takes a whole number, at least 0 and at most 2.
+        Number of times that each triangle of a shell is divided into four on its curved surface, which touches in its place: 0 (flat triangles), 1 or 2. With the solvers `implicit` and `static`. Takes a whole number, at least 0 and at most 2.
     creep_speed
-        Speed [m/s] below which bodies creep that friction should hold, with the solvers `implicit` and `static`; 0.001 if not given. Takes a number, greater than 0.
+        Largest speed [m/s] at which bodies creep that friction should hold. With the solvers `implicit` and `static`; 0.001 if not given. Takes a number, greater than 0.
     check_intersections
-        Whether states are searched for edges that go through triangles, by a way of its own. With the solvers `implicit` and `static` the search looks at each state; an intersection would be a fault of the program, and ends the run. With the solver `explicit` the search looks at the states that outputs write and at the last one, and counts the intersections of bodies that are deeper than 1e-4 of the mean edge: a warning, and `intersections` in `--json`. Holds for all contacts of the solver. Takes true or false; false if not given.
+        True to search states for edges that go through triangles, independently of the contact search. With the solvers `implicit` and `static` the search looks at each state; an intersection would be a fault of the program, and ends the run. With the solver `explicit` the search looks at the last state and the states that outputs write. It counts the intersections of bodies that are deeper than 1e-4 of the mean edge, in a warning and in `intersections` of `--json`. Holds for all contacts of the solver. Takes true or false; false if not given.
     separate
-        Whether bodies that overlap at the start are pushed apart before the run, by the least ways of their nodes. The shape at rest stays as it is, so that the run starts deformed. Without it they are refused. Takes true or false; false if not given.
+        True to push bodies that overlap at the start apart before the run, with the smallest displacements of their nodes. The shape at rest stays, so that the run starts deformed. Without this key overlapping bodies are an error. Takes true or false; false if not given.
     gap
-        Gap [m] between the shapes at rest, beyond the distance that surfaces keep. Where bodies overlap or are nearer, their nodes at rest move apart by the least ways, so that the run starts without stress. For organs that touch in one segmentation and are meshed one by one. Takes a number, greater than 0.
+        Gap [m] between the shapes at rest, beyond the distance that surfaces keep. Where bodies overlap or are nearer, their nodes at rest move apart by the smallest displacements, so that the run starts without stress. For organs that touch in one segmentation and are meshed one by one. Takes a number, greater than 0.
     """
 
     _type: ClassVar[str | None] = None
@@ -1547,7 +1547,7 @@ class Vtu(Table):
     data
         The fields. Tensors have nine components xx, xy, xz, yx, yy, yz, zx, zy, zz in this order; `[view]` colours by one of them with `component`, and probes of a `csv` output write each into a column. Takes an array of texts ("displacement", "velocity", "rotation", "reaction", "reaction-moment", "deformation-gradient", "cauchy-stress", "pk2-stress", "von-mises", "green-strain", "fibre", "fibre-stretch", "pressure", "J", "cell-J", "energy-density", "element-step", "membrane-force", "bending-moment", "stress-top", "stress-middle", "stress-bottom", "membrane-energy", "bending-energy", "drilling-energy", "thickness", "current-thickness", "axial-stretch", "axial-force", "surface-strain", "contact-force", "contact-pressure", "gap", "slip", "constraint", "load" or "weight"); ["displacement","von-mises"] if not given.
     at
-        Where fields of cells are written. Takes "cells" or "points"; "cells" if not given.
+        Place at which fields of cells are written. Takes "cells" or "points"; "cells" if not given.
     curved
         Parts that each edge of a shell is cut into, to show its curved surface instead of flat triangles. Takes a whole number, at least 1 and at most 100.
     """
@@ -1573,9 +1573,9 @@ class Csv(Table):
     reactions
         Constraints whose reaction [N] is written; if not given, all. Columns `reaction.NAME.x`, `.y`, `.z`: the sum of the forces by which the constraint holds or moves its nodes. Takes an array of texts.
     moments_about
-        A point [m], fixed in space, about which the moments of these reactions are written [N m], in columns `moment.NAME.x`, `.y`, `.z`: the sum of (place − point) × force over the nodes where they are, and of shells also of the moments on the nodes. Takes 3 numbers.
+        A point [m], fixed in space, about which the moments of these reactions are written [N m], in columns `moment.NAME.x`, `.y`, `.z`. A moment is the sum of (place − point) × force over the nodes at their current places. For shells the moments on the nodes are added. Takes 3 numbers.
     energy
-        Whether energies [J] are written. Takes true or false; true if not given.
+        True to write energies [J]. Takes true or false; true if not given.
     probes
         Points of bodies or surfaces whose fields are written. Takes a table of tables.
     """
@@ -1592,52 +1592,52 @@ class Csv(Table):
 
 @dataclass(frozen=True, kw_only=True)
 class View(Table):
-    """`[view]`. How pictures and films of the scene are taken (`pliant render`, `pliant run --picture`) and how the window opens (`pliant view`). It changes nothing of the run.
+    """`[view]`. View for pictures and films of the scene (`pliant render`, `pliant run --picture`) and for the window at the start (`pliant view`). It does not change the run.
 
     Parameters
     ----------
     on
         The body or the carried surface that is shown; if not given, all bodies together. Takes a text.
     colour
-        What the colours tell; `label`: the labels of the elements, each in a colour of its own; `none`: the colour of tissue. If not given, `von-mises`, and `displacement` on surfaces that shells carry. Takes one of "none", "label", "displacement", "velocity", "rotation", "reaction", "reaction-moment", "deformation-gradient", "cauchy-stress", "pk2-stress", "von-mises", "green-strain", "fibre", "fibre-stretch", "pressure", "J", "cell-J", "energy-density", "element-step", "membrane-force", "bending-moment", "stress-top", "stress-middle", "stress-bottom", "membrane-energy", "bending-energy", "drilling-energy", "thickness", "current-thickness", "axial-stretch", "axial-force", "surface-strain", "contact-force", "contact-pressure", "gap", "slip", "constraint", "load", "weight".
+        Quantity that the colours show; `label`: the labels of the elements, each in a colour of its own; `none`: the colour of tissue. If not given, `von-mises`, and `displacement` on surfaces that shells carry. Takes one of "none", "label", "displacement", "velocity", "rotation", "reaction", "reaction-moment", "deformation-gradient", "cauchy-stress", "pk2-stress", "von-mises", "green-strain", "fibre", "fibre-stretch", "pressure", "J", "cell-J", "energy-density", "element-step", "membrane-force", "bending-moment", "stress-top", "stress-middle", "stress-bottom", "membrane-energy", "bending-energy", "drilling-energy", "thickness", "current-thickness", "axial-stretch", "axial-force", "surface-strain", "contact-force", "contact-pressure", "gap", "slip", "constraint", "load", "weight".
     hide
-        What is left out, so that what lies inside or behind is seen: labels of elements by number, name or range, and bodies, obstacles and tools by name, as `[2, "tumour", "5-8", "grasper"]`. A name that both have is that of the label. Takes an array of whole numbers or texts; [] if not given.
+        Parts to hide, so that parts inside or behind are seen, as `[2, "tumour", "5-8", "grasper"]`. Labels of elements are given by number, name or range, and bodies, obstacles and tools by name. A name that a label and a body share means the label. Takes an array of whole numbers or texts; [] if not given.
     look
-        What looks otherwise than the rest, by names as in `hide`: `look.liver = { opacity = 0.3, colour = "liver" }`. The opacity goes from 0 to 1; the colour is `view` (as the rest), `label`, `tissue`, `liver`, `brain`, `colon`, `artery`, `vein`, `tumour`, `bone` or `steel`. Takes a table of tables; {} if not given.
+        Parts that look different from the rest, by names as in `hide`: `look.liver = { opacity = 0.3, colour = "liver" }`. The opacity goes from 0 to 1; the colour is `view` (as the rest), `label`, `tissue`, `liver`, `brain`, `colon`, `artery`, `vein`, `tumour`, `bone` or `steel`. Takes a table of tables; {} if not given.
     component
         A component of a vector (`x`, `y`, `z`) or a tensor (`xx`, `xy`, …), instead of the size of a vector; a tensor needs one. Takes one of "x", "y", "z", "xx", "yy", "zz", "xy", "yz", "xz".
     map
-        The map of colours; all but `turbo` are even to eyes that see no red or green. Takes one of "viridis", "cividis", "magma", "inferno", "plasma", "turbo", "blue-red"; "viridis" if not given.
+        The map of colours; all but `turbo` look even to eyes that see no red or green. Takes one of "viridis", "cividis", "magma", "inferno", "plasma", "turbo", "blue-red"; "viridis" if not given.
     range
-        Values of the first and the last colour, in SI units; if not given, those of all frames without the outermost 0.5 %. Takes 2 numbers.
+        Values of the first and the last colour, in SI units; if not given, from the values of all frames without the outermost 0.5 %. Takes 2 numbers.
     edges
-        Whether the edges of the elements are drawn. Takes true or false; false if not given.
+        True to draw the edges of the elements. Takes true or false; false if not given.
     wireframe
-        Whether nothing but the edges of the elements on the surface is drawn. Takes true or false; false if not given.
+        True to draw only the edges of the elements on the surface. Takes true or false; false if not given.
     ghost
-        Whether the shape at rest is drawn, as a ghost. Takes true or false; false if not given.
+        True to draw the shape at rest, as a ghost. Takes true or false; false if not given.
     fibres
-        Whether fibres are drawn on the surface and in a section, as short lines that follow the deformation. Takes true or false; false if not given.
+        True to draw fibres on the surface and in a section, as short lines that follow the deformation. Takes true or false; false if not given.
     contacts
-        Whether the forces of contacts are drawn, through the bodies: a dot at each node that touches something, and an arrow along the force on it. The note tells what the longest one stands for. Takes true or false; false if not given.
+        True to draw the forces of contacts, through the bodies: a dot at each node in contact, and an arrow along the force on it. The note shows the force of the longest arrow. Takes true or false; false if not given.
     marks
-        Whether constraints and loads are marked, through the bodies: squares where nodes are held, dots where they are moved, bars under plates, arrows along the forces of loads, and one along the weight of all. At most 300 of each kind are drawn. Takes true or false; false if not given.
+        True to mark constraints and loads, through the bodies. Squares mark held nodes, dots moved nodes, and bars nodes under plates. Arrows point along the forces of loads, and one along the weight of all. At most 300 of each kind are drawn. Takes true or false; false if not given.
     critical
-        Whether the element with the smallest `element-step` is marked, through the body. Shells are then shown flat. Takes true or false; false if not given.
+        True to mark the element with the smallest `element-step`, through the body. Shells are then shown flat. Takes true or false; false if not given.
     mark_maximum
-        Whether the largest value that the colours tell is marked: a ring at its place and the number. The ring is dashed where something hides the place. Takes true or false; true if not given.
+        True to mark the largest value that the colours show, by a ring at its place and the number. The ring is dashed if something hides the place. Takes true or false; true if not given.
     occlusion
-        Whether folds and contacts are darker, where less light from all sides arrives. Takes true or false; true if not given.
+        True to darken folds and contacts, where less light from all sides arrives. Takes true or false; true if not given.
     texture
-        What the surface is like; a texture stays where it is in the body at rest, and moves with it. Takes "none" or "skin"; "none" if not given.
+        Texture of the surface. It is fixed in the body at rest, and moves with the body. Takes "none" or "skin"; "none" if not given.
     clip
-        A plane: what lies on the side of its normal is taken away, and shows what is inside. Takes { point = …, normal = … }.
+        A cutting plane: everything on the side of its normal is taken away, so that the inside is seen. Takes { point = …, normal = … }.
     at
         The instant of a single picture [s]; if not given, the end of the run. Takes a number, greater than 0.
     camera
-        Where it is seen from. Takes a table.
+        Camera of the view. Takes a table.
     background
-        What stands behind. Takes one of "light", "white", "dark"; "light" if not given.
+        Background of the picture. Takes one of "light", "white", "dark"; "light" if not given.
     size
         Width and height of pictures [pixels]. Takes 2 whole numbers; [1280,800] if not given.
     curved
