@@ -13,9 +13,9 @@ extern "C" {
 /* All that a program has open. */
 typedef struct PliantContext PliantContext;
 
-/* What a call returns. */
+/* Result of a call. */
 typedef enum PliantStatus {
-    /* It did what was asked. */
+    /* The call succeeded. */
     PLIANT_STATUS_OK = 0,
     /* A pointer is null that must not be. */
     PLIANT_STATUS_NULL = 1,
@@ -33,19 +33,19 @@ typedef enum PliantStatus {
     PLIANT_STATUS_BUSY = 7,
     /* There is nothing of this name. */
     PLIANT_STATUS_UNKNOWN = 8,
-    /* The scene has mistakes; line, column and key tell the first one. */
+    /* The scene has mistakes; line, column and key locate the first one. */
     PLIANT_STATUS_SCENE = 9,
     /* A file can't be read. */
     PLIANT_STATUS_FILE = 10,
-    /* The simulation failed: kind, body, node, element and time tell where. */
+    /* The simulation failed; kind, body, node, element and time locate the failure. */
     PLIANT_STATUS_FAILED = 11,
     /* The solver or the device can't do this. */
     PLIANT_STATUS_UNSUPPORTED = 12,
-    /* Another thread asked to stop; what was done so far stays. */
+    /* Another thread asked to stop; the steps taken so far stay. */
     PLIANT_STATUS_STOPPED = 13,
     /* The program was built for another version of this interface. */
     PLIANT_STATUS_VERSION = 14,
-    /* Cells of a mesh have nodes that there are not, or a kind that is none. */
+    /* A cell names a node that does not exist, or has an unknown type. */
     PLIANT_STATUS_BAD_CELLS = 15,
     /* A snapshot is damaged, or of another model. */
     PLIANT_STATUS_BAD_SNAPSHOT = 16,
@@ -53,8 +53,8 @@ typedef enum PliantStatus {
     PLIANT_STATUS_INTERNAL = 17,
 } PliantStatus;
 
-/* What went wrong, and where. The caller owns it; it holds no memory of the library. Texts are UTF-8, end
- * with a zero and are cut where they are longer. */
+/* An error and its place. The caller owns it; it holds no memory of the library. Texts are UTF-8, end with a
+ * zero and are cut where they are longer. */
 typedef struct PliantError {
     /* The code that the call returned. */
     PliantStatus status;
@@ -70,7 +70,7 @@ typedef struct PliantError {
     int64_t element;
     /* Time [s] of the simulation; NaN if it is about none. */
     double time;
-    /* Of `PLIANT_STATUS_FAILED`: `not-finite`, `inverted`, `unbalanced`, `unstable`, `singular`,
+    /* Kind of a `PLIANT_STATUS_FAILED`: `not-finite`, `inverted`, `unbalanced`, `unstable`, `singular`,
      * `not-converged`, `blocked`, `intersecting`, `hourglass`, `device`, `output` or `input`. */
     char kind[32];
     /* The body that it is about. */
@@ -79,7 +79,7 @@ typedef struct PliantError {
     char key[256];
     /* The scene file, as it was given. */
     char file[512];
-    /* What is wrong and what to try. */
+    /* The mistake, and a remedy. */
     char message[2048];
 } PliantError;
 
@@ -121,11 +121,11 @@ typedef uint64_t PliantScene;
 
 /* Cells of one kind, numbered as in VTK. The library copies them. */
 typedef struct PliantCells {
-    /* `PLIANT_TETS` or another kind; the numbers are those of VTK. */
+    /* `PLIANT_TETS` or another kind, with the numbers of VTK. */
     uint32_t kind;
-    /* How many cells. */
+    /* Number of cells. */
     size_t count;
-    /* Nodes of a cell after those of the one before, from 0. */
+    /* Nodes of all cells, cell after cell, counted from 0. */
     const uint32_t *nodes;
     /* A label for each cell, or null. */
     const int32_t *labels;
@@ -135,8 +135,8 @@ typedef struct PliantCells {
  * it reports mistakes in its values. */
 PliantStatus pliant_scene_load(const PliantContext *context, const char *path, PliantScene *scene, PliantError *error);
 
-/* Opens a scene from its text, of so many bytes. Files that it names are relative to `folder`; null is the
- * folder of the process. `name` is what errors call it; null is `scene.toml`. */
+/* Opens a scene from its text of `length` bytes. Files that it names are relative to `folder`; null is the
+ * folder of the process. `name` is the name of the text in errors; null is `scene.toml`. */
 PliantStatus pliant_scene_parse(const PliantContext *context, const char *scene_text, size_t length, const char *folder, const char *name, PliantScene *scene, PliantError *error);
 
 /* Changes a value of a scene, as `--set` does: `law.tissue.young-modulus=4e3`, `scene.until=2`,
@@ -154,16 +154,16 @@ PliantStatus pliant_scene_close(const PliantContext *context, PliantScene scene,
 /* A simulation that is open: a number that `pliant_simulation_open` gives, never 0. */
 typedef uint64_t PliantSimulation;
 
-/* Makes a simulation of a scene as it is now, at its start. It computes on so many threads of its own, 1024
- * at most; 0 takes `threads` of the scene's `[run]`. Results do not depend on their number. Images are
- * meshed and shapes built here: this can take seconds. */
+/* Makes a simulation of a scene as it is now, at its start. It computes on threads of its own, 1024 at most;
+ * with 0 it takes `threads` of the scene's `[run]`. Results do not depend on their number. Images are meshed
+ * and shapes built here: this can take seconds. */
 PliantStatus pliant_simulation_open(const PliantContext *context, PliantScene scene, uint32_t threads, PliantSimulation *simulation, PliantError *error);
 
 /* Closes a simulation. One that is stepped by another thread is stopped first; its memory goes when that
  * call returns. */
 PliantStatus pliant_simulation_close(const PliantContext *context, PliantSimulation simulation, PliantError *error);
 
-/* Where a simulation is, and its sizes. */
+/* Time, step and sizes of a simulation. */
 typedef struct PliantNow {
     /* Time [s]. */
     double time;
@@ -175,27 +175,27 @@ typedef struct PliantNow {
     uint64_t nodes;
 } PliantNow;
 
-/* Tells where a simulation is. */
+/* Reports time, step and sizes of a simulation. */
 PliantStatus pliant_now(const PliantContext *context, PliantSimulation simulation, PliantNow *now, PliantError *error);
 
-/* Goes so many steps on. `done`, if it is not null, gets how many were taken, also where one fails or
- * another thread asks to stop. After a failure the simulation stands at the last good instant; restore a
+/* Takes `count` steps. `done`, if it is not null, gets the number of steps taken, also after a failure or a
+ * stop from another thread. After a failure the simulation stands at the last good instant; restore a
  * snapshot, or close it. */
 PliantStatus pliant_step(const PliantContext *context, PliantSimulation simulation, uint64_t count, uint64_t *done, PliantError *error);
 
-/* Goes on until a time [s], to the instant nearest to it; else as `pliant_step`. A time that has passed
- * takes no step. */
+/* Steps to the instant nearest to a time [s], like `pliant_step`. A time that has passed takes no step. */
 PliantStatus pliant_run_until(const PliantContext *context, PliantSimulation simulation, double time, uint64_t *done, PliantError *error);
 
-/* Asks the thread that steps a simulation to stop after its step. A step that takes long is given up: it is
- * not taken. Without such a thread, the next call that steps returns at once. Any thread may ask. */
+/* Asks the thread that steps a simulation to stop after its step. A step that takes long is abandoned, and
+ * the simulation stays at the instant before. Without such a thread, the next call that steps returns at
+ * once. Any thread may ask. */
 PliantStatus pliant_stop(const PliantContext *context, PliantSimulation simulation, PliantError *error);
 
 /* Pushes nodes with forces [N], three numbers a node, in the order of `pliant_body`, until they are
  * replaced; their work is external. `count` is the number of nodes of all bodies, or 0 to end all. */
 PliantStatus pliant_push(const PliantContext *context, PliantSimulation simulation, const double *forces, size_t count, PliantError *error);
 
-/* What a name is looked for among. */
+/* Bodies, as the kind of a name. */
 #define PLIANT_BODIES 0
 
 /* Surfaces that bodies carry. */
@@ -236,7 +236,7 @@ typedef struct PliantBuffer {
     uint32_t numbers;
 } PliantBuffer;
 
-/* What a surface has. */
+/* Sizes of a surface. */
 typedef struct PliantSurface {
     /* Its number in the simulation, for the calls below. */
     uint32_t number;
@@ -250,34 +250,34 @@ typedef struct PliantSurface {
  * only nodes on the boundary are vertices. It stays open as long as the simulation. */
 PliantStatus pliant_surface_open(const PliantContext *context, PliantSimulation simulation, const char *name, PliantSurface *surface, PliantError *error);
 
-/* Copies the three vertices of each triangle, counter-clockwise seen from outside. There is room for so many
- * triangles. */
+/* Copies the three vertices of each triangle, counter-clockwise seen from outside. `capacity` is the number
+ * of triangles that there is room for. */
 PliantStatus pliant_surface_triangles(const PliantContext *context, PliantSimulation simulation, uint32_t surface, uint32_t *triangles, size_t capacity, PliantError *error);
 
 /* Copies where the vertices are [m]. */
 PliantStatus pliant_surface_positions(const PliantContext *context, PliantSimulation simulation, uint32_t surface, PliantBuffer buffer, PliantError *error);
 
-/* Copies the unit normals of the vertices: the mean of those of the triangles around each, by area. */
+/* Copies the unit normals of the vertices: the mean of the normals of the triangles around each, by area. */
 PliantStatus pliant_surface_normals(const PliantContext *context, PliantSimulation simulation, uint32_t surface, PliantBuffer buffer, PliantError *error);
 
-/* Lends positions [m] and unit normals, three `double` a vertex. What is pointed to stays as it is until the
- * next call of this function for this surface, and is there until the simulation is closed; the pointers
+/* Lends positions [m] and unit normals, three `double` a vertex. The values stay the same until the next
+ * call of this function for this surface. The memory stays until the simulation is closed, and the pointers
  * stay the same. `normals` may be null, which saves their cost. */
 PliantStatus pliant_surface_lend(const PliantContext *context, PliantSimulation simulation, uint32_t surface, const double **positions, const double **normals, PliantError *error);
 
-/* The nodes of a body: so many from the first one on, counted over all bodies. */
+/* The nodes of a body: `count` nodes from the first one on, counted over all bodies. */
 typedef struct PliantNodes {
     /* The first one. */
     uint64_t first;
-    /* How many. */
+    /* Number of nodes. */
     uint64_t count;
 } PliantNodes;
 
-/* Tells the nodes of a body by name; null is all bodies. They are numbered as in its mesh file, or in the
- * mesh that was given, unless repairs changed these; a wall on a solid has only nodes of its own here. */
+/* Reports the nodes of a body by name; null is all bodies. They are numbered as in its mesh file or in the
+ * given mesh, unless repairs changed the numbers. A wall on a solid has only nodes of its own here. */
 PliantStatus pliant_body(const PliantContext *context, PliantSimulation simulation, const char *body, PliantNodes *found, PliantError *error);
 
-/* Where nodes are [m]. */
+/* Positions of nodes [m]. */
 #define PLIANT_POSITION 0
 
 /* Displacements of nodes [m]. */
@@ -286,14 +286,15 @@ PliantStatus pliant_body(const PliantContext *context, PliantSimulation simulati
 /* Velocities of nodes [m/s]. */
 #define PLIANT_VELOCITY 2
 
-/* Where nodes are at rest [m]. */
+/* Positions of nodes at rest [m]. */
 #define PLIANT_REST 3
 
 /* Copies positions, displacements, velocities (`PLIANT_POSITION`, …) of the nodes of a body by name; null is
  * all bodies. */
 PliantStatus pliant_nodes(const PliantContext *context, PliantSimulation simulation, const char *body, uint32_t what, PliantBuffer buffer, PliantError *error);
 
-/* Fields are read at the points of a body's mesh: those of elements as means of those around. */
+/* Fields are read at the points of a body's mesh: fields of elements are means of the elements around each
+ * point. */
 #define PLIANT_AT_POINTS 0
 
 /* Fields are read in the elements, as computed. */
@@ -313,19 +314,19 @@ PliantStatus pliant_contact_force(const PliantContext *context, PliantSimulation
 
 /* Energies of all bodies [J]. */
 typedef struct PliantEnergies {
-    /* Of motion. */
+    /* Energy of motion. */
     double kinetic;
     /* Stored in elements, and taken by laws that relax. */
     double internal;
     /* Taken by damping. */
     double damping;
-    /* Of stiffness against hourglass modes, beside `internal`. */
+    /* Energy of the stiffness against hourglass modes, in addition to `internal`. */
     double hourglass;
     /* Work from outside. */
     double external;
-    /* What explicit steps of changing length added. */
+    /* Energy added by explicit steps of changing length. */
     double step_changes;
-    /* What is missing of their balance over the largest of them so far: above 0.05 a run is questionable. */
+    /* Error of the energy balance over the largest energy so far: above 0.05 a run is questionable. */
     double balance;
 } PliantEnergies;
 
@@ -337,9 +338,9 @@ PliantStatus pliant_fingerprint(const PliantContext *context, PliantSimulation s
 
 /* A tool or an obstacle at an instant. */
 typedef struct PliantTool {
-    /* Where its frame is [m]. */
+    /* Origin of its frame [m]. */
     double position[3];
-    /* How it is turned: a unit quaternion x, y, z, w. */
+    /* Rotation of its frame: a unit quaternion x, y, z, w. */
     double rotation[4];
     /* The angle [rad] between its jaws; 0 without any. */
     double opening;
@@ -350,40 +351,41 @@ typedef struct PliantTool {
 } PliantTool;
 
 /* Leads a tool to a pose within a time [s] from now, on a straight way and the shortest turn; there it
- * stays. Its jaws go on as they were going. `rotation` is a quaternion x, y, z, w of any length but 0.
- * `arrival`, if it is not null, gets the time [s] at which it is there: later than asked for where nodes
- * would be passed over on the way. */
+ * stays. The motion of its jaws continues. `rotation` is a quaternion x, y, z, w of any length but 0.
+ * `arrival`, if it is not null, gets the time [s] of arrival. That time is later than asked for if the tool
+ * would pass over nodes on the way. */
 PliantStatus pliant_tool_lead(const PliantContext *context, PliantSimulation simulation, const char *tool, const double *position, const double *rotation, double within, double *arrival, PliantError *error);
 
-/* Opens or closes the jaws of a tool to an angle [rad] within a time [s] from now, while it goes on as it
- * was going; else as `pliant_tool_lead`. */
+/* Opens or closes the jaws of a tool to an angle [rad] within a time [s] from now. The motion of the tool
+ * continues. `arrival` is as in `pliant_tool_lead`. */
 PliantStatus pliant_tool_open(const PliantContext *context, PliantSimulation simulation, const char *tool, double angle, double within, double *arrival, PliantError *error);
 
-/* Leads a tool to a pose and its jaws to an angle [rad], which are there together; else as
- * `pliant_tool_lead`. */
+/* Leads a tool to a pose and its jaws to an angle [rad], so that both arrive together. The other arguments
+ * are as in `pliant_tool_lead`. */
 PliantStatus pliant_tool_lead_open(const PliantContext *context, PliantSimulation simulation, const char *tool, const double *position, const double *rotation, double angle, double within, double *arrival, PliantError *error);
 
-/* Tells where a tool, an obstacle or a jaw (`grasper.upper`, `grasper.lower`) is, and what it feels. */
+/* Reports the pose of a tool, an obstacle or a jaw (`grasper.upper`, `grasper.lower`), and the forces on it. */
 PliantStatus pliant_tool(const PliantContext *context, PliantSimulation simulation, const char *tool, PliantTool *now, PliantError *error);
 
 /* Takes hold of nodes by a spring of a stiffness [N/m]; infinite is a pin. It acts on their mean by
  * `weights`, which need not sum to 1; null weighs all the same. The stiffness is at most the one with which
- * steps stay stable; `pliant_grip` tells it. `grip` gets its number. It pulls nothing until it is moved. */
+ * steps stay stable; `pliant_grip` reports it. `grip` gets the number of the grip. The grip pulls nothing
+ * until it is moved. */
 PliantStatus pliant_grip_nodes(const PliantContext *context, PliantSimulation simulation, const uint32_t *nodes, const double *weights, size_t count, double stiffness, uint32_t *grip, PliantError *error);
 
-/* Takes hold of a surface around its vertex that is nearest to a point [m], as a hand does: of what lies
- * within a radius [m] of it at rest and hangs together with it, less with the distance; else as
- * `pliant_grip_nodes`. With a radius of 0 it holds the vertex alone. */
+/* Takes hold of a surface around its vertex that is nearest to a point [m], as a hand does. The grip holds
+ * the connected surface within a radius [m] of that vertex at rest, less with the distance. With a radius of
+ * 0 it holds the vertex alone. Stiffness and number are as in `pliant_grip_nodes`. */
 PliantStatus pliant_grip_surface(const PliantContext *context, PliantSimulation simulation, uint32_t surface, const double *point, double radius, double stiffness, uint32_t *grip, PliantError *error);
 
-/* Moves a grip to a place [m]: what it holds is pulled there from the next step on. */
+/* Moves a grip to a place [m]: it pulls its nodes there from the next step on. */
 PliantStatus pliant_grip_move(const PliantContext *context, PliantSimulation simulation, uint32_t grip, const double *place, PliantError *error);
 
 /* A grip at an instant. */
 typedef struct PliantGrip {
-    /* The mean of what it holds [m]. */
+    /* Mean place of its nodes [m]. */
     double point[3];
-    /* Where it pulls to [m]. */
+    /* Place to which the grip pulls [m]. */
     double place[3];
     /* Its force on the body [N]. */
     double force[3];
@@ -391,7 +393,7 @@ typedef struct PliantGrip {
     double stiffness;
 } PliantGrip;
 
-/* Tells how a grip pulls. */
+/* Reports the pull of a grip. */
 PliantStatus pliant_grip(const PliantContext *context, PliantSimulation simulation, uint32_t grip, PliantGrip *now, PliantError *error);
 
 /* Releases a grip. */
@@ -411,8 +413,8 @@ PliantStatus pliant_snapshot_restore(const PliantContext *context, PliantSimulat
  * there are; with a null buffer of 0 bytes nothing else is given. */
 PliantStatus pliant_snapshot_bytes(const PliantContext *context, PliantSnapshot snapshot, uint8_t *buffer, size_t capacity, size_t *length, PliantError *error);
 
-/* Reads a snapshot of a simulation of the same scene from bytes. `PLIANT_STATUS_BAD_SNAPSHOT` tells of
- * others, and of damage. */
+/* Reads a snapshot of a simulation of the same scene from bytes. Other and damaged snapshots give
+ * `PLIANT_STATUS_BAD_SNAPSHOT`. */
 PliantStatus pliant_snapshot_read(const PliantContext *context, PliantSimulation simulation, const uint8_t *bytes, size_t count, PliantSnapshot *snapshot, PliantError *error);
 
 /* Closes a snapshot. */
