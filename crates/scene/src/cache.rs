@@ -234,10 +234,11 @@ impl MeshCache {
     /// Deletes the files unused for longest except the newest, until all files fit the limit.
     fn drop_oldest(&self, folder: &Path, newest: &Path) -> io::Result<()> {
         let endings = [MESH.1, GRID.1, PART];
-        let own =
-            |path: &PathBuf| path.extension().is_some_and(|ending| endings.iter().any(|own| ending == *own));
+        let is_ours = |path: &PathBuf| {
+            path.extension().is_some_and(|ending| endings.iter().any(|known| ending == *known))
+        };
         let mut files: Vec<(SystemTime, PathBuf, u64)> = fs::read_dir(folder)?
-            .filter_map(|entry| Some(entry.ok()?.path()).filter(own))
+            .filter_map(|entry| Some(entry.ok()?.path()).filter(is_ours))
             .filter_map(|path| {
                 // Another process may drop it at the same time.
                 let about = fs::metadata(&path).ok()?;

@@ -65,14 +65,14 @@ impl World {
     /// The two participants of a contact with the surfaces that touch, first the one whose coupled nodes are
     /// nodes of the other.
     fn sides(&self, name: &str) -> Option<[(usize, &Meet); 2]> {
-        let sides = self.participants.iter().enumerate().flat_map(|(part, own)| {
-            let meets = own.built.meets.iter().filter(|meet| meet.contact == name);
+        let sides = self.participants.iter().enumerate().flat_map(|(part, participant)| {
+            let meets = participant.built.meets.iter().filter(|meet| meet.contact == name);
             meets.map(move |meet| (part, meet))
         });
         let mut sides: Vec<(usize, &Meet)> = sides.collect();
         sides.sort_by_key(|(part, _)| {
-            let own = &self.participants[*part];
-            own.built.implicit.is_some() || own.scene.run.solver != SolverName::Explicit
+            let participant = &self.participants[*part];
+            participant.built.implicit.is_some() || participant.scene.run.solver != SolverName::Explicit
         });
         sides.try_into().ok()
     }
@@ -86,7 +86,7 @@ impl World {
         notes: &mut Vec<String>,
     ) -> Result<Contact, Mistake> {
         self.can_meet(table, sides)?;
-        let [own, other] = sides.map(|(_, meet)| meet);
+        let [touching, other] = sides.map(|(_, meet)| meet);
         let mut surface = other.surface.clone();
         if self.is_behind(sides) {
             surface.faces.iter_mut().for_each(|face| face.swap(1, 2));
@@ -100,16 +100,16 @@ impl World {
             return Err(Mistake { message, label: "overlapping", help });
         }
         // Half of the thickness of shells, or what solids keep.
-        let usual = own.offset + other.offset;
+        let usual = touching.offset + other.offset;
         let offset = table.thickness.unwrap_or_else(|| {
             let (second, place) = self.side_by_side(sides, &surface);
-            if usual > 0.0 { usual } else { usual_distance(&own.surface, Some(&second), place) }
+            if usual > 0.0 { usual } else { usual_distance(&touching.surface, Some(&second), place) }
         });
         if table.thickness.is_none() && usual == 0.0 {
             notes.push(told_distance(name, [offset; 2]));
         }
         let touch = Touch { friction: table.friction, offset };
-        Ok(Contact { name: name.into(), surface: own.surface.clone(), with: With::Body(surface), touch })
+        Ok(Contact { name: name.into(), surface: touching.surface.clone(), with: With::Body(surface), touch })
     }
 
     /// Checks that the solvers, bodies and ties of two participants let them touch.
@@ -184,15 +184,15 @@ impl World {
 
     /// True if the second body is a sheet whose normals point away from the first one.
     fn is_behind(&self, sides: [(usize, &Meet); 2]) -> bool {
-        let [(host, own), (of, other)] = sides;
+        let [(host, touching), (of, other)] = sides;
         let sheet = &self.participants[of].built.bodies[other.body];
         if sheet.mesh.volume_blocks().any(|block| !block.is_empty()) {
             return false;
         }
-        let all: Vec<u32> = (0..sheet.boundary.faces.len() as u32).collect();
-        let faces = SurfaceLocator::new(&sheet.boundary, &all, &sheet.mesh.points);
+        let face_numbers: Vec<u32> = (0..sheet.boundary.faces.len() as u32).collect();
+        let faces = SurfaceLocator::new(&sheet.boundary, &face_numbers, &sheet.mesh.points);
         let rest = &self.participants[host].built.model.rest;
-        let ways = own.surface.nodes.iter().filter_map(|&node| {
+        let ways = touching.surface.nodes.iter().filter_map(|&node| {
             let at = Vector3::from(rest[node as usize]);
             let found = faces.closest(&at)?;
             let way = at - found.position;
@@ -221,9 +221,9 @@ impl World {
     fn overlap(&self, sides: [(usize, &Meet); 2], surface: &Surface) -> Option<String> {
         let bodies = sides.map(|(part, meet)| &self.participants[part].built.bodies[meet.body]);
         let (other, place) = self.side_by_side(sides, surface);
-        let own = &sides[0].1.surface;
-        let size = own.nodes.iter().map(|&node| place(node).amax()).fold(0.0, f64::max);
-        let inside = overlaps([(bodies[0], own), (bodies[1], &other)], size, place);
+        let touching = &sides[0].1.surface;
+        let size = touching.nodes.iter().map(|&node| place(node).amax()).fold(0.0, f64::max);
+        let inside = overlaps([(bodies[0], touching), (bodies[1], &other)], size, place);
         told_overlap([&bodies[0].name, &bodies[1].name], &inside)
     }
 

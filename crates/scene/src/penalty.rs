@@ -49,9 +49,9 @@ impl World {
             let guest = at(0, guest);
             let nodes = match chosen(table, guest) {
                 Ok(nodes) => nodes,
-                Err(told) => {
+                Err(message) => {
                     let place = source.span(&["tie", name, "nodes"]);
-                    out.push(Diagnostic::error(told).at(place, "this selection"));
+                    out.push(Diagnostic::error(message).at(place, "this selection"));
                     continue;
                 }
             };
@@ -60,12 +60,12 @@ impl World {
             };
             out.extend(doubt_points(source, name, table, [guest.body, at(1, host).body]));
             let alone = found.nodes.iter().map(|&node| [(node, 1.0)]).collect::<Vec<_>>();
-            let own = pliant_mechanics::mapping::Weights::from_rows(alone.iter().map(|row| &row[..]));
+            let guest_nodes = pliant_mechanics::mapping::Weights::from_rows(alone.iter().map(|row| &row[..]));
             notes.push(found.note);
             self.ties.push(PenaltyTie {
                 name: name.clone(),
                 parts: [first, second],
-                points: [own, found.mapping],
+                points: [guest_nodes, found.mapping],
             });
         }
         notes.into_iter().for_each(|note| self.note(note));
@@ -102,9 +102,9 @@ impl World {
             }
         }
         for [a, b] in tied {
-            for (own, other) in [(a, b), (b, a)] {
+            for (index, other) in [(a, b), (b, a)] {
                 let number = self.participants[other].plan.steps.number;
-                let part = &mut self.participants[own];
+                let part = &mut self.participants[index];
                 if part.scene.run.solver == SolverName::Implicit && automatic(part) {
                     let steps = &mut part.plan.steps;
                     steps.number = steps.number.max(number);
@@ -117,14 +117,14 @@ impl World {
 
 /// The nodes of a body that a tie is about, in its model.
 fn chosen(table: &TieTable, guest: Placed<'_>) -> Result<Vec<u32>, String> {
-    let own = &guest.model.bodies[guest.index];
+    let guest_body = &guest.model.bodies[guest.index];
     match &table.nodes {
         Some(selection) => {
             let found = selection.nodes(&guest.body.mesh, &guest.body.boundary);
             found
-                .map(|nodes| nodes.into_iter().map(|node| own.node(node)).collect())
+                .map(|nodes| nodes.into_iter().map(|node| guest_body.node(node)).collect())
                 .map_err(|e| e.to_string())
         }
-        None => Ok(own.all_nodes().collect()),
+        None => Ok(guest_body.all_nodes().collect()),
     }
 }

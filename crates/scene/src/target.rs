@@ -221,8 +221,8 @@ fn contact_field(scene: &Scene) -> Option<FieldName> {
             OutputTable::Csv(table) => table.probes.values().flat_map(|probe| probe.data.clone()).collect(),
         }
     };
-    let all = scene.outputs.iter().flat_map(|(_, output)| fields(output));
-    all.into_iter().find(|field| field.is_of_contact())
+    let found = scene.outputs.iter().flat_map(|(_, output)| fields(output));
+    found.into_iter().find(|field| field.is_of_contact())
 }
 
 /// The key that a GPU can't support, in words, and a remedy.

@@ -117,8 +117,8 @@ impl World {
         }
         let labels: Vec<Region> = names.labels.iter().map(|(label, _)| Region::Label(label)).collect();
         let bodies: Vec<Region> = names.bodies.keys().map(|&body| Region::Body(body)).collect();
-        for (all, what) in [(labels, "labels"), (bodies, "bodies")] {
-            if !all.is_empty() && all.iter().all(|region| hidden.contains(region)) {
+        for (regions, what) in [(labels, "labels"), (bodies, "bodies")] {
+            if !regions.is_empty() && regions.iter().all(|region| hidden.contains(region)) {
                 let message = format!("all {what} are hidden: nothing is left to be seen");
                 refuse(&["view", "hide"], message, "all", "hide fewer");
             }

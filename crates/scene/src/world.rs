@@ -64,7 +64,7 @@ impl World {
         let mut built = Vec::new();
         for (name, part) in scene.split()? {
             match build_watched(&part, cache, watch) {
-                Ok(own) => built.push((name, part, own)),
+                Ok(assembled) => built.push((name, part, assembled)),
                 Err(errors) => mistakes.extend_from_slice(errors.diagnostics()),
             }
         }

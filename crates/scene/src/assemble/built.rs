@@ -66,8 +66,8 @@ impl BuiltBody {
         if self.is_of_bars() {
             return BodyLocator::Lines(&self.mesh);
         }
-        let all: Vec<u32> = (0..self.boundary.faces.len() as u32).collect();
-        BodyLocator::Wall(&self.boundary, SurfaceLocator::new(&self.boundary, &all, &self.mesh.points))
+        let faces: Vec<u32> = (0..self.boundary.faces.len() as u32).collect();
+        BodyLocator::Wall(&self.boundary, SurfaceLocator::new(&self.boundary, &faces, &self.mesh.points))
     }
 
     /// The number that a node has in the mesh file, or in the mesh that a program gives.

@@ -82,9 +82,11 @@ impl Context<'_> {
     /// Rejects damping by stiffness that differs between bodies, or that the solver does not have.
     fn check_stiffness_damping(&mut self, is_implicit: bool) {
         let scene = self.scene;
-        let mut own = scene.bodies.iter().filter(|(_, body)| body.on.is_none());
-        let Some((first, table)) = own.next() else { return };
-        if let Some((name, _)) = own.find(|(_, body)| body.stiffness_damping != table.stiffness_damping) {
+        let mut with_nodes = scene.bodies.iter().filter(|(_, body)| body.on.is_none());
+        let Some((first, table)) = with_nodes.next() else { return };
+        if let Some((name, _)) =
+            with_nodes.find(|(_, body)| body.stiffness_damping != table.stiffness_damping)
+        {
             let message = format!("`{name}` and `{first}` have different `stiffness-damping`");
             let help = "bodies of a participant share one value";
             self.error(&["body", name, "stiffness-damping"], message, "another value", help);
@@ -145,19 +147,19 @@ impl Context<'_> {
     fn check_keys_of_bodies(&mut self, is_implicit: bool) {
         for (name, body) in &self.scene.bodies {
             let shell = body.model == BodyModel::Shell;
-            let own = body.on.is_none();
+            let has_nodes = body.on.is_none();
             let bar = body.model == BodyModel::Bar;
             let wall = matches!(body.model, BodyModel::Shell | BodyModel::Membrane);
             let others = [
                 ("area", bar, "`model = \"bar\"`"),
                 ("slack", bar, "`model = \"bar\"`"),
                 ("tension-only", bar, "`model = \"bar\"`"),
-                ("faces", !own, "a wall with `on`"),
-                ("rotations", !own && shell, "a shell with `on`"),
-                ("damping", own, "a body with nodes of its own"),
-                ("stiffness-damping", own, "a body with nodes of its own"),
-                ("velocity", own, "a body with nodes of its own"),
-                ("initial-displacement", own, "a body with nodes of its own"),
+                ("faces", !has_nodes, "a wall with `on`"),
+                ("rotations", !has_nodes && shell, "a shell with `on`"),
+                ("damping", has_nodes, "a body with nodes of its own"),
+                ("stiffness-damping", has_nodes, "a body with nodes of its own"),
+                ("velocity", has_nodes, "a body with nodes of its own"),
+                ("initial-displacement", has_nodes, "a body with nodes of its own"),
                 (
                     "fraction",
                     matches!(body.model, BodyModel::Solid | BodyModel::Shell),

@@ -78,9 +78,9 @@ impl Meshed<'_> {
             self.error(&["body", name], message, "`area` is missing", help);
             return None;
         };
-        let own = &self.assembly.bodies[body];
+        let model_body = &self.assembly.bodies[body];
         let cells: Vec<[u32; 2]> =
-            lines.iter().map(|&cell| nodes(block, cell, |node| own.node(node))).collect();
+            lines.iter().map(|&cell| nodes(block, cell, |node| model_body.node(node))).collect();
         let cord = Cord { slack: table.slack, tension_only: table.tension_only };
         Some(Cells::bar(cells, &self.assembly.rest, area, cord))
     }

@@ -314,9 +314,9 @@ mod tests {
             nodes.iter().map(|&n| Vector3::from(model.rest[n as usize])).sum::<Vector3>() / nodes.len() as f64
         };
         let fibres = solid.fibre.iter().map(|&f| Vector3::from(f));
-        let all: Vec<_> = fibres.enumerate().map(|(cell, fibre)| (centre(cell), fibre)).collect();
-        assert!(all.len() > 40 && all.iter().all(|(_, fibre)| (fibre.norm() - 1.0).abs() < 1e-12));
-        all
+        let pairs: Vec<_> = fibres.enumerate().map(|(cell, fibre)| (centre(cell), fibre)).collect();
+        assert!(pairs.len() > 40 && pairs.iter().all(|(_, fibre)| (fibre.norm() - 1.0).abs() < 1e-12));
+        pairs
     }
 
     fn refused(mesh: &str, fibre: &str) -> String {
@@ -390,8 +390,8 @@ mod tests {
             // the angle that the facet subtends. Near the middle of the sphere no facet is nearest.
             let aside = 0.5 * edge / 0.05;
             let mesh = SPHERE.replace("0.012", &edge.to_string());
-            let all = fibres(&mesh, "{ tangential = { closest-to = [0.3, 0, 1] } }");
-            for (centre, fibre) in all.into_iter().filter(|(centre, _)| centre.norm() > 0.03) {
+            let pairs = fibres(&mesh, "{ tangential = { closest-to = [0.3, 0, 1] } }");
+            for (centre, fibre) in pairs.into_iter().filter(|(centre, _)| centre.norm() > 0.03) {
                 let radius = centre.normalize();
                 let exact = wanted - radius * radius.dot(&wanted);
                 // The direction turns the faster, the nearer `closest-to` is to the normal.
@@ -429,12 +429,12 @@ mod tests {
     fn laplace_through_the_wall_of_a_tube_is_radial() {
         let rule = "{ laplace = { from = { set = 'inner' }, to = { set = 'outer' } } }";
         for (cells, limit) in [("tets", 0.2), ("hexes", 0.01)] {
-            let all = fibres(&format!("{TUBE}, as = '{cells}'"), rule);
+            let pairs = fibres(&format!("{TUBE}, as = '{cells}'"), rule);
             let off = |(centre, fibre): &(Vector3, Vector3)| {
                 (fibre - Vector3::new(centre.x, centre.y, 0.0).normalize()).norm()
             };
-            let mean = all.iter().map(off).sum::<f64>() / all.len() as f64;
-            let worst = all.iter().map(off).fold(0.0, f64::max);
+            let mean = pairs.iter().map(off).sum::<f64>() / pairs.len() as f64;
+            let worst = pairs.iter().map(off).fold(0.0, f64::max);
             // Hexes are symmetric about the radius through their centre; tets are not: first order in the
             // cell size.
             assert!(worst < limit && mean < limit / 2.0, "{cells}: {worst:.3}, mean {mean:.3}");

@@ -66,13 +66,13 @@ mod tests {
 
     #[test]
     fn immersed_cubes_of_an_ellipsoid_weigh_what_it_weighs() {
-        let own = CUBE.lines().find(|line| line.starts_with("mesh")).unwrap();
+        let mesh_line = CUBE.lines().find(|line| line.starts_with("mesh")).unwrap();
         let of = |cells: &str| {
             let mesh = format!(
                 "mesh = {{ ellipsoid = {{ radii = [0.05, 0.04, 0.03] }}, edge = 0.01, as = '{cells}' }}"
             );
             let held = "nodes = { box = [[-1, -1, -1], [1, 1, -0.02]] }";
-            built_alone(&CUBE.replace(own, &mesh).replace("nodes = { set = \"z-min\" }", held))
+            built_alone(&CUBE.replace(mesh_line, &mesh).replace("nodes = { set = \"z-min\" }", held))
         };
         let exact = 4.0 / 3.0 * std::f64::consts::PI * 0.05 * 0.04 * 0.03;
         let immersed = of("immersed-hexes");
@@ -85,13 +85,13 @@ mod tests {
     /// Nothing but their stiffness against hourglass patterns would hold cubes of which little is filled.
     #[test]
     fn immersed_cubes_are_full_elements_unless_something_else_is_given() {
-        let own = CUBE.lines().find(|line| line.starts_with("mesh")).unwrap();
+        let mesh_line = CUBE.lines().find(|line| line.starts_with("mesh")).unwrap();
         let element = |cells: &str, law: &str, more: &str| {
             let mesh = format!(
                 "mesh = {{ ellipsoid = {{ radii = [0.05, 0.04, 0.03] }}, edge = 0.02, as = '{cells}' }}\n{more}"
             );
             let held = "nodes = { box = [[-1, -1, -1], [1, 1, -0.02]] }";
-            let text = CUBE.replace(own, &mesh).replace("nodes = { set = \"z-min\" }", held);
+            let text = CUBE.replace(mesh_line, &mesh).replace("nodes = { set = \"z-min\" }", held);
             let built = built_alone(&text.replace("neo-hookean", law));
             built.model.solids[0].cells.element()
         };
@@ -107,14 +107,14 @@ mod tests {
     #[test]
     fn fractions_of_a_mesh_file_count_where_the_body_names_them() {
         let folder = tempfile::tempdir().unwrap();
-        let own = CUBE.lines().find(|line| line.starts_with("mesh")).unwrap();
+        let mesh_line = CUBE.lines().find(|line| line.starts_with("mesh")).unwrap();
         let mut mesh = built_alone(CUBE).bodies[0].mesh.clone();
         let write = |mesh: &mut pliant_geometry::Mesh, values: Vec<f64>| {
             mesh.blocks[0].data.insert("fill".into(), pliant_geometry::DataArray::scalar(values));
             io::write(&folder.path().join("cube.vtu"), mesh).unwrap();
         };
         let of = |more: &str| {
-            let text = CUBE.replace(own, &format!("mesh = {{ file = 'cube.vtu' }}\n{more}"));
+            let text = CUBE.replace(mesh_line, &format!("mesh = {{ file = 'cube.vtu' }}\n{more}"));
             let text =
                 text.replace("nodes = { set = \"z-min\" }", "nodes = { box = [[-1, -1, -1], [1, 1, 0]] }");
             let scene =

@@ -258,15 +258,15 @@ impl Meshed<'_> {
     fn by_numbers(&mut self, name: &str, table: &BodyTable, mesh: &Mesh) -> Option<BodyTable> {
         let labels = Labels::of(mesh);
         let mut numbered = table.clone();
-        let mut all = self.numbered(&labels, &["body", name, "law"], &mut numbered.law);
-        all &= self.numbered(&labels, &["body", name, "density"], &mut numbered.density);
+        let mut known = self.numbered(&labels, &["body", name, "law"], &mut numbered.law);
+        known &= self.numbered(&labels, &["body", name, "density"], &mut numbered.density);
         if let Some(hourglass) = &mut numbered.hourglass {
-            all &= self.numbered(&labels, &["body", name, "hourglass"], hourglass);
+            known &= self.numbered(&labels, &["body", name, "hourglass"], hourglass);
         }
         if let Some(Thickness::PerCell(ThicknessRule::ByLabel(map))) = &mut numbered.thickness {
-            all &= self.number_keys(&labels, &["body", name, "thickness", "by-label"], map);
+            known &= self.number_keys(&labels, &["body", name, "thickness", "by-label"], map);
         }
-        all.then_some(numbered)
+        known.then_some(numbered)
     }
 
     fn numbered<T>(&mut self, labels: &Labels, path: &[&str], values: &mut ByLabel<T>) -> bool {
@@ -279,7 +279,7 @@ impl Meshed<'_> {
     /// Replaces names of labels by their numbers; returns true if all names are known. Numbers keep their
     /// spelling.
     fn number_keys<T>(&mut self, labels: &Labels, path: &[&str], map: &mut BTreeMap<String, T>) -> bool {
-        let mut all = true;
+        let mut known = true;
         let mut numbered = BTreeMap::new();
         for (key, value) in std::mem::take(map) {
             let is_number = key.parse::<f64>().is_ok();
@@ -293,7 +293,7 @@ impl Meshed<'_> {
                         "given twice",
                         "leave one of them out",
                     );
-                    all = false;
+                    known = false;
                 }
                 Ok(number) => {
                     numbered.insert(number, value);
@@ -302,12 +302,12 @@ impl Meshed<'_> {
                     let help =
                         "labels go by number, or by the name that the image or the mesh file gives them";
                     self.error(&[path, &[key.as_str()]].concat(), error.to_string(), "no such label", help);
-                    all = false;
+                    known = false;
                 }
             }
         }
         *map = numbered;
-        all
+        known
     }
 
     /// Checks values by label (law, density, …): each cell's label needs a value, and each label with a value
@@ -426,10 +426,10 @@ impl Meshed<'_> {
         cells: &[u32],
         (hourglass, shear): (Option<Hourglass>, f64),
     ) -> Cells {
-        let own = &self.assembly.bodies[body];
+        let model_body = &self.assembly.bodies[body];
         let rest = &self.assembly.rest;
-        let tets = || cells.iter().map(|&c| nodes(block, c, |node| own.node(node))).collect();
-        let hexes = || cells.iter().map(|&c| nodes(block, c, |node| own.node(node))).collect();
+        let tets = || cells.iter().map(|&c| nodes(block, c, |node| model_body.node(node))).collect();
+        let hexes = || cells.iter().map(|&c| nodes(block, c, |node| model_body.node(node))).collect();
         match (block.kind, element) {
             (CellKind::Tet, Some(Element::Tet4Anp)) => Cells::averaged_tet4(tets(), rest, Averaging::Nodal),
             (CellKind::Tet, Some(Element::Tet4Ianp)) => {
@@ -508,7 +508,7 @@ fn parts(table: &BodyTable, block: &CellBlock) -> Vec<MaterialCells> {
         let given = table.hourglass.as_ref().filter(|_| has_hourglass);
         let hourglass = given.and_then(|given| given.of(label)).copied();
         parts
-            .entry((law, density.0.to_bits(), hourglass.map(|own| own.0.to_bits())))
+            .entry((law, density.0.to_bits(), hourglass.map(|hourglass| hourglass.0.to_bits())))
             .or_insert_with(|| MaterialCells { law: law.clone(), density, hourglass, cells: Vec::new() })
             .cells
             .push(cell);
@@ -528,8 +528,8 @@ pub(super) fn law_path<'a>(body: &'a str, choice: &'a ByLabel<String>, law: &str
 /// The nodes of a cell, by the number of each in the model.
 pub(super) fn nodes<const N: usize>(block: &CellBlock, cell: u32, number: impl Fn(u32) -> u32) -> [u32; N] {
     let mut nodes = [0; N];
-    for (own, &node) in nodes.iter_mut().zip(block.cell(cell as usize)) {
-        *own = number(node);
+    for (numbered, &node) in nodes.iter_mut().zip(block.cell(cell as usize)) {
+        *numbered = number(node);
     }
     nodes
 }
@@ -555,7 +555,9 @@ mod tests {
             let text = CUBE.replace("law = \"tissue\"\ndensity = 1000", more);
             parts(&read(&text).bodies[0].1, &block)
                 .into_iter()
-                .map(|part| (part.law, part.density.0, part.hourglass.map(|own| own.0), part.cells))
+                .map(|part| {
+                    (part.law, part.density.0, part.hourglass.map(|hourglass| hourglass.0), part.cells)
+                })
                 .collect::<Vec<_>>()
         };
         let message = |law: &str, density, hourglass, cells: &[u32]| {

@@ -34,15 +34,15 @@ impl Meshed<'_> {
     ) -> Option<Vec<[f64; 3]>> {
         let built = &self.bodies[body];
         let numbers: BTreeMap<u32, u32> = self.assembly.bodies[body].all_nodes().zip(0..).collect();
-        let own: Vec<u32> = nodes.iter().filter_map(|node| numbers.get(node).copied()).collect();
+        let body_nodes: Vec<u32> = nodes.iter().filter_map(|node| numbers.get(node).copied()).collect();
         let (key, found) = match &table.from {
             NodeVectorSource::PointData(name) => (
                 "point-data",
-                point_data(name, &built.name, &built.mesh).and_then(|data| of_data(name, data, &own)),
+                point_data(name, &built.name, &built.mesh).and_then(|data| of_data(name, data, &body_nodes)),
             ),
             NodeVectorSource::Csv(file) => {
                 let rows = read_rows(self.scene.file(file), file, built.file_nodes);
-                let numbers = own.iter().map(|&node| built.number_in_file(node));
+                let numbers = body_nodes.iter().map(|&node| built.number_in_file(node));
                 ("csv", rows.and_then(|rows| of_rows(file, &rows, numbers)))
             }
         };

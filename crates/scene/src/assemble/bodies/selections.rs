@@ -31,7 +31,7 @@ impl Meshed<'_> {
         path: &[&str],
     ) -> Option<Vec<u32>> {
         let built = &self.bodies[body];
-        let own = &self.assembly.bodies[body];
+        let model_body = &self.assembly.bodies[body];
         match selection.nodes(&built.mesh, &built.boundary) {
             Ok(nodes) => {
                 let (mesh, name) = (&built.mesh, &built.name);
@@ -50,7 +50,7 @@ impl Meshed<'_> {
                         self.context.out.push(doubt);
                     }
                 }
-                Some(nodes.into_iter().map(|node| own.node(node)).collect())
+                Some(nodes.into_iter().map(|node| model_body.node(node)).collect())
             }
             Err(error) => {
                 self.error(path, error.to_string(), "this selection", "");

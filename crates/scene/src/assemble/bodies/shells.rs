@@ -99,9 +99,9 @@ impl Meshed<'_> {
         };
         let normals = self.normals(draft, body)?;
         let flat = given_normals(table, mesh).map(|_| self.flat(name, block)).unwrap_or_default();
-        let own = &self.assembly.bodies[body];
+        let model_body = &self.assembly.bodies[body];
         let cells: Vec<[u32; 3]> =
-            (0..block.len() as u32).map(|cell| nodes(block, cell, |node| own.node(node))).collect();
+            (0..block.len() as u32).map(|cell| nodes(block, cell, |node| model_body.node(node))).collect();
         let count = cells.len();
         let shell = Shell {
             name: name.into(),
@@ -155,7 +155,7 @@ impl Meshed<'_> {
         let &Draft { name, table, given, .. } = draft;
         let labels = block.data.get("label");
         let mut known: BTreeMap<Option<String>, Wall> = BTreeMap::new();
-        let mut all = Vec::with_capacity(block.len());
+        let mut walls = Vec::with_capacity(block.len());
         for cell in 0..block.len() {
             let label = labels.map(|labels| labels.item(cell)[0].to_string());
             let material = match known.get(&label) {
@@ -169,12 +169,12 @@ impl Meshed<'_> {
                     *known.entry(label).or_insert(material)
                 }
             };
-            all.push(material);
+            walls.push(material);
         }
         if known.len() == 1 {
-            all.truncate(1);
+            walls.truncate(1);
         }
-        Some(all)
+        Some(walls)
     }
 
     /// Young's modulus and Poisson's ratio of a law at small strain.
@@ -227,9 +227,9 @@ impl Meshed<'_> {
             self.error(&["body", name, "element"], message, "not with `layers`", help);
             return None;
         }
-        let all: Vec<Option<Layer>> =
+        let tried: Vec<Option<Layer>> =
             (0..table.layers.len()).map(|number| self.layer(draft, number)).collect();
-        let layers: Vec<Layer> = all.into_iter().collect::<Option<_>>()?;
+        let layers: Vec<Layer> = tried.into_iter().collect::<Option<_>>()?;
         if let Some(fibre) = &table.fibre {
             let directions = self.shell_directions(draft, fibre, block)?;
             return Some((layers, directions.into_iter().map(Vector3::from).collect()));
@@ -257,9 +257,9 @@ impl Meshed<'_> {
                 Orthotropic { young, poisson, shear }
             }
             (None, None, None) => {
-                let (own, whole) = ([path.as_slice(), &["law"]].concat(), ["body", name, "law"]);
+                let (layer_path, whole) = ([path.as_slice(), &["law"]].concat(), ["body", name, "law"]);
                 let (law, path) = match (&layer.law, &table.law) {
-                    (Some(law), _) => (law, own.as_slice()),
+                    (Some(law), _) => (law, layer_path.as_slice()),
                     (None, ByLabel::One(law)) => (law, whole.as_slice()),
                     (None, ByLabel::Each(_)) => {
                         let message = format!("layer {number} of `{name}` has no elastic constants");
@@ -364,7 +364,7 @@ impl Meshed<'_> {
             self.error(&["body", name, "crease"], message, "has no effect here", "remove it, or `normals`");
             return None;
         }
-        let own = &self.assembly.bodies[body];
+        let model_body = &self.assembly.bodies[body];
         match (table.normals, given_normals(table, mesh)) {
             (None | Some(Normals::Triangles), None) => Some(BTreeMap::new()),
             (Some(Normals::Mesh), None) => {
@@ -377,7 +377,7 @@ impl Meshed<'_> {
             (_, Some(data)) => {
                 let of = |node: u32| {
                     let given = data.item(node as usize);
-                    (own.node(node), Vector3::new(given[0], given[1], given[2]))
+                    (model_body.node(node), Vector3::new(given[0], given[1], given[2]))
                 };
                 // A fit gives no normal at nodes where none fits all triangles: there normals are estimated,
                 // with creases.

@@ -70,8 +70,8 @@ impl Meshed<'_> {
         let (mut mesh, parents) = Surface { faces: faces.clone() }.to_mesh(&built.mesh.points);
         add_labels(&mut mesh, &faces, &built.mesh);
         for (set, points) in &built.mesh.point_sets {
-            let own = |point: &u32| parents.binary_search(point).ok().map(|at| at as u32);
-            let points: Vec<u32> = points.iter().filter_map(own).collect();
+            let wall_node = |point: &u32| parents.binary_search(point).ok().map(|at| at as u32);
+            let points: Vec<u32> = points.iter().filter_map(wall_node).collect();
             if !points.is_empty() {
                 mesh.point_sets.insert(set.clone(), points);
             }
@@ -159,9 +159,9 @@ impl Meshed<'_> {
             self.error(&["body", name, "thickness"], message, "must be above 0", help);
             return None;
         }
-        let own = &self.assembly.bodies[body];
+        let model_body = &self.assembly.bodies[body];
         let cells: Vec<[u32; 3]> =
-            triangles.iter().map(|&cell| nodes(block, cell, |node| own.node(node))).collect();
+            triangles.iter().map(|&cell| nodes(block, cell, |node| model_body.node(node))).collect();
         let families = fibre.len() / cells.len().max(1);
         let across = fibre.iter().enumerate().position(|(at, &fibre)| {
             let [a, b, c] = cells[at / families].map(|node| self.assembly.rest[node as usize]);
@@ -187,8 +187,8 @@ fn add_labels(surface: &mut Mesh, faces: &[pliant_geometry::Face], host: &Mesh) 
         Some(block.data.get("label")?.item(parent.index as usize)[0])
     };
     for block in &mut surface.blocks {
-        let own = faces.iter().filter(|face| face.kind == block.kind).map(|face| labels(face.parent));
-        if let Some(values) = own.collect::<Option<Vec<f64>>>() {
+        let face_labels = faces.iter().filter(|face| face.kind == block.kind).map(|face| labels(face.parent));
+        if let Some(values) = face_labels.collect::<Option<Vec<f64>>>() {
             block.data.insert("label".into(), DataArray::scalar(values));
         }
     }

@@ -52,7 +52,7 @@ impl Checked<'_> {
     fn check_free_bodies(&mut self) {
         let scene = self.scene;
         let flies =
-            |name: &str| scene.bodies.iter().any(|(own, body)| own == name && body.velocity.is_some());
+            |name: &str| scene.bodies.iter().any(|(known, body)| known == name && body.velocity.is_some());
         // A wall is held with the body that it is on.
         let with_nodes = self.assembly.bodies.iter().enumerate().filter(|(_, body)| !body.nodes.is_empty());
         let mut notes = Vec::new();
@@ -76,10 +76,10 @@ impl Checked<'_> {
             }
             let name = &body.name;
             let surfaces = self.assembly.surfaces.iter().filter(|s| s.body == index).map(|s| s.name.as_str());
-            let own: Vec<&str> = surfaces.chain([name.as_str()]).collect();
+            let names: Vec<&str> = surfaces.chain([name.as_str()]).collect();
             let loaded = scene.loads.iter().any(|(_, load)| match load {
                 LoadTable::Gravity(_) => false,
-                load => load.on().is_some_and(|on| own.contains(&on)),
+                load => load.on().is_some_and(|on| names.contains(&on)),
             });
             let falls = scene.scene.gravity.is_some()
                 || scene.loads.iter().any(|(_, load)| matches!(load, LoadTable::Gravity(g) if g.on.as_ref().is_none_or(|on| on == name)));

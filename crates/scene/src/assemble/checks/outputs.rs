@@ -201,8 +201,8 @@ impl Checked<'_> {
             "add a contact: `[contact.NAME]` with `between = [\"{name}\", …]`, or leave the field out"
         );
         let index_text = index.to_string();
-        let own = [path, &[index_text.as_str()]].concat();
-        let at = if self.source().node(&own).is_some() { own } else { path.to_vec() };
+        let entry = [path, &[index_text.as_str()]].concat();
+        let at = if self.source().node(&entry).is_some() { entry } else { path.to_vec() };
         self.error(&at, message, "no contact", help);
     }
 

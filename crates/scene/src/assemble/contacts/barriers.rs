@@ -83,10 +83,10 @@ impl Loaded<'_> {
         &mut self,
         name: &str,
         table: &ContactTable,
-        [own, with]: [Partner; 2],
+        [touching, with]: [Partner; 2],
         barriers: &mut BarrierTables,
     ) -> Option<f64> {
-        let bodies: Vec<usize> = [own, with].into_iter().filter_map(Partner::body).collect();
+        let bodies: Vec<usize> = [touching, with].into_iter().filter_map(Partner::body).collect();
         let distance = table.barrier_distance.unwrap_or_else(|| DISTANCE * self.diagonal());
         let softest = bodies.iter().filter_map(|&body| self.softest(body)).reduce(f64::min);
         let Some(stiffness) = table.barrier_stiffness.or_else(|| softest.map(|young| STIFFNESS * young))
@@ -148,8 +148,8 @@ impl Loaded<'_> {
     /// The diagonal [m] of all bodies.
     fn diagonal(&self) -> f64 {
         let bounds = self.bodies.iter().filter_map(|body| body.mesh.bounds());
-        let all = bounds.reduce(|(a, b), (c, d)| (a.inf(&c), b.sup(&d)));
-        all.map_or(1.0, |(low, high)| (high - low).norm())
+        let enclosing = bounds.reduce(|(a, b), (c, d)| (a.inf(&c), b.sup(&d)));
+        enclosing.map_or(1.0, |(low, high)| (high - low).norm())
     }
 
     /// The least Young's modulus [Pa] of the laws of a body at small strain.

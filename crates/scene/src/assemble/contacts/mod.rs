@@ -72,9 +72,9 @@ pub(crate) fn overlaps(
         if body.mesh.volume_blocks().all(|block| block.is_empty()) {
             continue;
         }
-        let (cells, all) =
+        let (cells, face_numbers) =
             (Locator::new(&body.mesh), (0..body.boundary.faces.len() as u32).collect::<Vec<_>>());
-        let faces = SurfaceLocator::new(&body.boundary, &all, &body.mesh.points);
+        let faces = SurfaceLocator::new(&body.boundary, &face_numbers, &body.mesh.points);
         for at in surface.nodes.iter().map(|&node| place(node)) {
             if cells.locate(at).is_some_and(|found| found.distance == 0.0)
                 && let Some(on) = faces.closest(&at)
@@ -170,7 +170,7 @@ impl Loaded<'_> {
     /// The contacts of the scene.
     fn contacts(&mut self, terms: &mut Terms) -> Contacts {
         let scene = self.scene;
-        let mut all = Contacts::default();
+        let mut found = Contacts::default();
         // Things that nothing touches are checked, too.
         for (kind, tables) in [("obstacle", &scene.obstacles), ("tool", &scene.tools)] {
             for (name, table) in tables {
@@ -178,27 +178,27 @@ impl Loaded<'_> {
                     let message = format!("`{name}` is an obstacle already");
                     self.error(&[kind, name], message, "again", "give one of them another name");
                 }
-                all.rigids.extend(self.rigids(kind, name, table).into_iter().flatten());
+                found.rigids.extend(self.rigids(kind, name, table).into_iter().flatten());
             }
         }
         for (name, table) in &scene.contacts {
-            let contacts = self.contact(name, table, &all.rigids, terms).unwrap_or_default();
+            let contacts = self.contact(name, table, &found.rigids, terms).unwrap_or_default();
             if !scene.run.solver.solves_equations() {
-                self.keep_apart(name, table, &contacts, &mut all);
+                self.keep_apart(name, table, &contacts, &mut found);
             }
-            all.contacts.extend(contacts);
+            found.contacts.extend(contacts);
             if scene.run.solver.solves_equations() {
-                self.check_goes_with_barriers(name, &all);
+                self.check_goes_with_barriers(name, &found);
             }
         }
-        all
+        found
     }
 
     /// Notes contacts of a table whose bodies keep a smaller distance where they are nearer at the start.
     /// Also notes the distances that bodies keep if none is given. The new contacts get the next numbers
     /// after the present ones.
-    fn keep_apart(&mut self, name: &str, table: &ContactTable, contacts: &[Contact], all: &mut Contacts) {
-        let first = all.contacts.len();
+    fn keep_apart(&mut self, name: &str, table: &ContactTable, contacts: &[Contact], found: &mut Contacts) {
+        let first = found.contacts.len();
         let mut usual: Option<[f64; 2]> = None;
         for (contact, index) in contacts.iter().zip(first..) {
             let is_usual = table.thickness.is_none();
@@ -209,7 +209,7 @@ impl Loaded<'_> {
             };
             let offset = contact.touch.offset;
             if keeps_less && offset > 0.0 {
-                all.near.insert(index, Vec::new());
+                found.near.insert(index, Vec::new());
             }
             if is_usual {
                 let [least, most] = usual.unwrap_or([offset; 2]);
@@ -241,13 +241,13 @@ impl Loaded<'_> {
             return None;
         }
         let several = pairs.len() > 1;
-        let mut all = Vec::new();
+        let mut contacts = Vec::new();
         for (body, partner) in pairs {
-            let own = &self.bodies[body].name;
+            let body_name = &self.bodies[body].name;
             let full = match partner {
                 _ if !several => name.into(),
-                Partner::Rigid(rigid) => format!("{name}.{own}-{}", rigids[rigid].name),
-                Partner::Body(other) => format!("{name}.{own}-{}", self.bodies[other].name),
+                Partner::Rigid(rigid) => format!("{name}.{body_name}-{}", rigids[rigid].name),
+                Partner::Body(other) => format!("{name}.{body_name}-{}", self.bodies[other].name),
             };
             let surface = self.surface_of(name, table, body, 0)?;
             let with = match partner {
@@ -270,10 +270,10 @@ impl Loaded<'_> {
                 _ => self.note_apart(&full, &surface, table.thickness),
             }
             let touch = Touch { friction: table.friction, offset };
-            all.push(Contact { name: full, surface, with, touch });
+            contacts.push(Contact { name: full, surface, with, touch });
             terms.gaps.push(table.gap);
         }
-        Some(all)
+        Some(contacts)
     }
 
     /// True if the solver knows contact, and the keys of a table go with the solver and with each other.
@@ -352,17 +352,18 @@ impl Loaded<'_> {
             let is_solid = |body: &BuiltBody| body.mesh.volume_blocks().any(|block| !block.is_empty());
             // Under barriers thin walls touch, too; one on the boundary of a solid touches with that.
             let is_barrier = self.scene.run.solver.solves_equations();
-            let on_solid =
-                |name: &str| self.scene.bodies.iter().any(|(own, table)| own == name && table.on.is_some());
+            let on_solid = |name: &str| {
+                self.scene.bodies.iter().any(|(known, table)| known == name && table.on.is_some())
+            };
             let is_wall = |index: usize| is_barrier && self.shell_cells(index).is_some();
             let touching =
                 bodies.filter(|&(body, index)| is_solid(body) || is_wall(index) && !on_solid(&body.name));
             let touching: Vec<Partner> = touching.map(|(_, index)| Partner::Body(index)).collect();
             return Some(touching.into_iter().chain((0..rigids.len()).map(Partner::Rigid)).collect());
         }
-        let own = |rigid: &Rigid| rigid.name == *wanted || rigid.tool() == wanted;
+        let is_wanted = |rigid: &Rigid| rigid.name == *wanted || rigid.tool() == wanted;
         let found: Vec<Partner> =
-            (0..rigids.len()).filter(|&at| own(&rigids[at])).map(Partner::Rigid).collect();
+            (0..rigids.len()).filter(|&at| is_wanted(&rigids[at])).map(Partner::Rigid).collect();
         if !found.is_empty() {
             return Some(found);
         }
@@ -388,11 +389,11 @@ impl Loaded<'_> {
     /// The faces and nodes of a body that touch.
     fn surface_of(&mut self, name: &str, table: &ContactTable, body: usize, side: usize) -> Option<Surface> {
         let path = ["contact", name, "between"];
-        let own = self.bodies[body].name.clone();
+        let body_name = self.bodies[body].name.clone();
         let is_barrier = self.scene.run.solver.solves_equations();
         if self.shell_cells(body).is_some() && !is_barrier {
             let message =
-                format!("explicit contact is for solids, membranes and bars, and `{own}` is a shell");
+                format!("explicit contact is for solids, membranes and bars, and `{body_name}` is a shell");
             self.error(&path, message, "a shell", EXPLICIT);
             return None;
         }
@@ -427,14 +428,15 @@ impl Loaded<'_> {
         let mut bound: Vec<u32> = bound.flat_map(|constraint| constraint.nodes.iter().copied()).collect();
         bound.sort_unstable();
         let is_bound = |node: u32| bound.binary_search(&node).is_ok();
-        let with_bound = tied.filter_map(|(node, mut row)| row.any(|(own, _)| is_bound(own)).then_some(node));
+        let with_bound =
+            tied.filter_map(|(node, mut row)| row.any(|(followed, _)| is_bound(followed)).then_some(node));
         let with_bound: HashSet<u32> = with_bound.collect();
         let moved = |&&node: &&u32| {
             is_bound(node) || with_bound.contains(&node) || (follows[node as usize] && !is_barrier)
         };
         if let Some(&node) = nodes.iter().find(moved) {
             let message = format!(
-                "node {} of `{own}` is bound to other nodes by {}",
+                "node {} of `{body_name}` is bound to other nodes by {}",
                 self.assembly.locate_node(node).1,
                 if is_barrier { "a rigid part or a mean" } else { "a tie, a rigid part, a mean or a volume" }
             );
@@ -569,13 +571,13 @@ impl InContact<'_> {
     /// Returns the surfaces of bodies that touch surfaces of other participants.
     pub fn meets(&mut self) -> Vec<Meet> {
         let scene = self.scene;
-        let meet = |own: &mut Self, (name, table): &(String, ContactTable)| {
+        let meet = |assembling: &mut Self, (name, table): &(String, ContactTable)| {
             let side =
                 table.between.iter().position(|body| scene.bodies.iter().any(|(known, _)| known == body))?;
             let parts = [("separate", table.separate), ("gap", table.gap.is_some())];
             if let Some((key, _)) = parts.into_iter().find(|(_, given)| *given) {
                 let message = format!("`{key}` is for bodies of one participant");
-                own.error(
+                assembling.error(
                     &["contact", name, key],
                     message,
                     "between participants",
@@ -583,12 +585,12 @@ impl InContact<'_> {
                 );
                 return None;
             }
-            if !own.check_keys_of_contact(name, table, false) {
+            if !assembling.check_keys_of_contact(name, table, false) {
                 return None;
             }
-            let body = own.bodies.iter().position(|own| own.name == table.between[side])?;
-            let surface = own.surface_of(name, table, body, side)?;
-            Some(Meet { contact: name.clone(), side, body, surface, offset: 0.5 * own.thickest(body) })
+            let body = assembling.bodies.iter().position(|built| built.name == table.between[side])?;
+            let surface = assembling.surface_of(name, table, body, side)?;
+            Some(Meet { contact: name.clone(), side, body, surface, offset: 0.5 * assembling.thickest(body) })
         };
         scene.meets.iter().filter_map(|table| meet(self, table)).collect()
     }
@@ -601,7 +603,7 @@ impl InContact<'_> {
         let is_host = self.scene.run.solver == SolverName::Explicit;
         let bodies = self.assembly.bodies.iter().enumerate();
         let touching = bodies.map(|(index, body)| {
-            self.contacts.as_ref().is_some_and(|all| touches(all, body))
+            self.contacts.as_ref().is_some_and(|contacts| touches(contacts, body))
                 || is_host && meets.iter().any(|meet| meet.body == index)
         });
         Some(touching.collect())

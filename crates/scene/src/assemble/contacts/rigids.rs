@@ -303,10 +303,10 @@ pub(super) fn slowed(poses: Vec<(f64, Pose)>, reach: f64) -> (Vec<(f64, Pose)>, 
 pub(super) fn poses(file: &Path, text: io::Result<String>) -> Result<Vec<(f64, Pose)>, String> {
     let text = text.map_err(|error| format!("`{}` cannot be read: {error}", file.display()))?;
     let shown = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
-    let mut all = Vec::new();
+    let mut poses = Vec::new();
     for (row, line) in rows_of(&text) {
         let columns: Vec<&str> = row.split(',').map(str::trim).collect();
-        if all.is_empty() && columns[0].eq_ignore_ascii_case("t") {
+        if poses.is_empty() && columns[0].eq_ignore_ascii_case("t") {
             continue;
         }
         let numbers: Option<Vec<f64>> =
@@ -319,7 +319,7 @@ pub(super) fn poses(file: &Path, text: io::Result<String>) -> Result<Vec<(f64, P
             return Err(format!("{shown}:{line}: the quaternion has length {}, not 1", number(turn.norm())));
         }
         let turn = nalgebra::UnitQuaternion::from_quaternion(turn);
-        all.push((t, Pose::from_parts(Vector3::new(x, y, z).into(), turn)));
+        poses.push((t, Pose::from_parts(Vector3::new(x, y, z).into(), turn)));
     }
-    Ok(all)
+    Ok(poses)
 }

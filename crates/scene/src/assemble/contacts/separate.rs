@@ -112,8 +112,8 @@ impl<'s> InContact<'s> {
     pub(in crate::assemble) fn parted(self, ways: &[Vector3]) -> (Context<'s>, Vec<BuiltBody>) {
         let Tied { meshed, noted, .. } = self.loaded.tied;
         let Meshed { context, assembly, mut bodies, .. } = meshed;
-        for (body, own) in bodies.iter_mut().zip(&assembly.bodies) {
-            for (point, node) in body.mesh.points.iter_mut().zip(own.all_nodes()) {
+        for (body, model_body) in bodies.iter_mut().zip(&assembly.bodies) {
+            for (point, node) in body.mesh.points.iter_mut().zip(model_body.all_nodes()) {
                 *point += ways[node as usize];
             }
         }
@@ -212,20 +212,21 @@ impl<'s> InContact<'s> {
     /// Pushes nodes of a surface out of the cells of another body, the shortest way to its boundary.
     fn push_nodes_out(&self, surface: &Surface, other: &Surface, pushed: &mut Pushed) {
         let Some(body) = self.holder(other) else { return };
-        let (own, built) = (&self.assembly.bodies[body], &self.bodies[body]);
+        let (model_body, built) = (&self.assembly.bodies[body], &self.bodies[body]);
         let mut mesh = built.mesh.clone();
-        for (point, node) in mesh.points.iter_mut().zip(own.all_nodes()) {
+        for (point, node) in mesh.points.iter_mut().zip(model_body.all_nodes()) {
             *point = pushed.places[node as usize];
         }
-        let all: Vec<u32> = (0..built.boundary.faces.len() as u32).collect();
+        let face_numbers: Vec<u32> = (0..built.boundary.faces.len() as u32).collect();
         let cells = Locator::new(&mesh);
-        let faces = SurfaceLocator::new(&built.boundary, &all, &mesh.points);
+        let faces = SurfaceLocator::new(&built.boundary, &face_numbers, &mesh.points);
         for &node in &surface.nodes {
             let at = pushed.places[node as usize];
             let inside = cells.locate(at).is_some_and(|found| found.distance == 0.0);
             let Some(on) = faces.closest(&at).filter(|_| inside) else { continue };
             let Some(normal) = (on.position - at).try_normalize(pushed.round_off) else { continue };
-            let on = on.nodes.iter().zip(on.weights).map(|(&corner, weight)| (own.node(corner), -weight));
+            let on =
+                on.nodes.iter().zip(on.weights).map(|(&corner, weight)| (model_body.node(corner), -weight));
             let parts = std::iter::once((node, 1.0)).chain(on).collect();
             pushed.push(&Row { parts, normal });
         }
@@ -270,16 +271,16 @@ impl<'s> InContact<'s> {
         let model = Arc::clone(&self.assembly.model);
         let state = State { displacement: displacement.to_vec(), ..start };
         let recovery = Recovery::new(&model, &state);
-        let inverted = |(index, own)| {
+        let inverted = |(index, solid)| {
             let ratios = recovery.numbers(index, 1, |_, fields, to| to[0] = fields.cell_volume_ratio);
             // Of bars it is not a number.
-            Some((own, ratios.iter().position(|&ratio| ratio <= 0.0)?))
+            Some((solid, ratios.iter().position(|&ratio| ratio <= 0.0)?))
         };
         let found = model.solids.iter().enumerate().find_map(inverted);
-        let Some((own, cell)) = found else { return Some(()) };
+        let Some((solid, cell)) = found else { return Some(()) };
         let message = format!(
             "pushing bodies apart would invert element {} of `{}`",
-            own.original[cell], model.bodies[own.body].name
+            solid.original[cell], model.bodies[solid.body].name
         );
         let help = "move one of them (`at`): overlaps must be smaller than the elements there";
         self.error(&["contact", name, key], message, "too deep", help);

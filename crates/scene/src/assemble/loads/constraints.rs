@@ -114,10 +114,10 @@ impl Tied<'_> {
     fn check_limited(&mut self) {
         let mut found = Vec::new();
         for &limited in self.assembly.force_limits.keys() {
-            let own = &self.assembly.constraints[limited];
+            let constraint = &self.assembly.constraints[limited];
             let shares = |other: &Constraint| {
-                let component = (0..3).any(|c| own.components[c] && other.components[c]);
-                component && other.nodes.iter().any(|node| own.nodes.contains(node))
+                let component = (0..3).any(|c| constraint.components[c] && other.components[c]);
+                component && other.nodes.iter().any(|node| constraint.nodes.contains(node))
             };
             let others = self.assembly.constraints.iter().enumerate();
             let Some((_, other)) = others.filter(|(number, _)| *number != limited).find(|(_, o)| shares(o))
@@ -126,10 +126,10 @@ impl Tied<'_> {
             };
             let diagnostic = Diagnostic::error(format!(
                 "`{}` prescribes nodes of `{}`, which lag behind where the force reaches its limit",
-                other.name, own.name
+                other.name, constraint.name
             ));
             let place = self.source().key_span(&["constraint", &other.name]);
-            let limit = self.source().span(&["constraint", &own.name, "force-limit"]);
+            let limit = self.source().span(&["constraint", &constraint.name, "force-limit"]);
             let help = "take the shared nodes out of one of them with `{ difference = [ …, … ] }`, or limit `components`";
             let diagnostic = diagnostic.at(place, "shares nodes").also(limit, "this limit").help(help);
             found.push(diagnostic);
@@ -143,13 +143,19 @@ impl Tied<'_> {
         let mut turning: Vec<u32> = self.assembly.turns.iter().map(|turn| turn.node).collect();
         turning.sort_unstable();
         let turns = |node: &&u32| turning.binary_search(node).is_ok();
-        let holds = |own: &&Constraint| {
-            let encloses = own.motion.encloses() && !self.assembly.facets.is_empty();
-            encloses || (!own.motion.is_collective() && own.components[3..].contains(&true))
+        let holds = |constraint: &&Constraint| {
+            let encloses = constraint.motion.encloses() && !self.assembly.facets.is_empty();
+            encloses || (!constraint.motion.is_collective() && constraint.components[3..].contains(&true))
         };
         let held = self.assembly.constraints.iter().filter(holds);
         let met: Vec<(String, u32, bool)> = held
-            .filter_map(|own| Some((own.name.clone(), *own.nodes.iter().find(turns)?, own.motion.encloses())))
+            .filter_map(|constraint| {
+                Some((
+                    constraint.name.clone(),
+                    *constraint.nodes.iter().find(turns)?,
+                    constraint.motion.encloses(),
+                ))
+            })
             .collect();
         for (name, node, encloses) in met {
             let (body, node) = self.assembly.locate_node(node);
@@ -275,9 +281,9 @@ impl Tied<'_> {
     /// Shares of some nodes in the area of a body's boundary; only faces count all of whose nodes are chosen.
     /// Without such faces the shares are equal. They sum to 1.
     fn shares(&self, body: usize, nodes: &[u32]) -> Vec<f64> {
-        let (built, own) = (&self.bodies[body], &self.assembly.bodies[body]);
+        let (built, model_body) = (&self.bodies[body], &self.assembly.bodies[body]);
         let places: HashMap<u32, usize> = nodes.iter().copied().zip(0..).collect();
-        let place = |node: u32| places.get(&own.node(node)).copied();
+        let place = |node: u32| places.get(&model_body.node(node)).copied();
         let mut shares = vec![0.0; nodes.len()];
         for face in &built.boundary.faces {
             let corners: Option<Vec<usize>> = face.nodes().iter().map(|&node| place(node)).collect();

@@ -226,8 +226,8 @@ fn with_vessels(mut image: Image, choice: &Choice, table: &MeshTable) -> Result<
         let message = "`vessels` lie inside of labels, but this body is chosen by `threshold`".into();
         return Err(MeshFault { key: "vessels", message, help: help.into() });
     };
-    let all: Vec<LabelChoice> = vessels.iter().map(Label::choice).collect();
-    let chosen = image.choose(&all).map_err(|error| label_fault("vessels", table, &error))?;
+    let choices: Vec<LabelChoice> = vessels.iter().map(Label::choice).collect();
+    let chosen = image.choose(&choices).map_err(|error| label_fault("vessels", table, &error))?;
     let Choice::Labels(vessels) = chosen else { return Ok(image) };
     let (mut filled, voxels) = image.with_vessels_inside(organ, &vessels);
     let [inside, outside] = voxels.map(|voxels| voxels as f64 * image.grid.voxel_volume() * 1e6);
@@ -474,8 +474,8 @@ impl Fineness {
             Some(edge) => format!("of {edge} m in label {label}"),
             None => format!("finer in label {label}"),
         });
-        let all: Vec<String> = edge.into_iter().chain(inner).chain(protected).chain(distance).collect();
-        all.join(", ")
+        let parts: Vec<String> = edge.into_iter().chain(inner).chain(protected).chain(distance).collect();
+        parts.join(", ")
     }
 }
 

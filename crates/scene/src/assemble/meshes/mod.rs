@@ -284,19 +284,22 @@ impl Context<'_> {
 /// Returns the problems that keep a mesh of cells of a dimension from being simulated, with remedies. Cells
 /// of other dimensions do not count.
 fn problems(found: &Diagnosis, fixes: &[Fix], dimension: usize) -> Vec<(String, &'static str)> {
-    let own = |cells: &[CellId]| -> Vec<CellId> {
+    let of_dimension = |cells: &[CellId]| -> Vec<CellId> {
         cells.iter().filter(|cell| cell.kind.dimension() == dimension).copied().collect()
     };
-    let (lost, inverted, flat) =
-        (own(&found.out_of_range_cells), own(&found.inverted_cells), own(&found.degenerate_cells));
+    let (lost, inverted, flat) = (
+        of_dimension(&found.out_of_range_cells),
+        of_dimension(&found.inverted_cells),
+        of_dimension(&found.degenerate_cells),
+    );
     let repeats: Vec<CellId> = found.duplicate_cells.iter().map(|&[_, repeat]| repeat).collect();
-    let repeats = own(&repeats);
+    let repeats = of_dimension(&repeats);
     let reorder = match fixes.contains(&Fix::Reorder) {
         false => "add `fix = \"reorder\"` to the mesh to swap their nodes",
         true => "swapping their nodes does not help: remesh there",
     };
     let crowded: Vec<String> = found.crowded_faces.iter().map(|face| join(&face.nodes, "–")).collect();
-    let all = [
+    let kinds = [
         ("nodes with coordinates that are not finite", list(&found.non_finite_nodes), "repair the mesh file"),
         ("elements that name nodes which do not exist", list_cells(&lost), "repair the mesh file"),
         ("inverted elements at rest", list_cells(&inverted), reorder),
@@ -326,7 +329,7 @@ fn problems(found: &Diagnosis, fixes: &[Fix], dimension: usize) -> Vec<(String, 
             "elements overlap there: remesh",
         ),
     ];
-    let present = all.into_iter().filter(|(_, which, _)| !which.is_empty());
+    let present = kinds.into_iter().filter(|(_, which, _)| !which.is_empty());
     present.map(|(what, which, help)| (format!("{what}: {which}"), help)).collect()
 }
 
@@ -540,8 +543,8 @@ mod tests {
                 "cannot be made of immersed hexes",
             ),
         ] {
-            let own = CUBE.lines().find(|line| line.starts_with("mesh")).unwrap();
-            let scene = read(&CUBE.replace(own, &format!("mesh = {mesh}")));
+            let mesh_line = CUBE.lines().find(|line| line.starts_with("mesh")).unwrap();
+            let scene = read(&CUBE.replace(mesh_line, &format!("mesh = {mesh}")));
             let message = crate::build(&scene).unwrap_err().plain().to_string();
             assert!(message.contains(says), "{message}");
         }

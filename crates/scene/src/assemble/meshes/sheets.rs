@@ -162,9 +162,9 @@ mod tests {
             ("{ twisted-strip = { length = 1.2, width = 0.1, twist = 90, cells = [12, 2] } }", 48, 4),
         ] {
             let built = built_alone(&shell(mesh));
-            let own = &built.bodies[0].mesh;
+            let sheet = &built.bodies[0].mesh;
             let facets = built.implicit.as_ref().unwrap().model.facets.len();
-            assert_eq!((facets, own.point_sets.len()), (triangles, sets), "{mesh}");
+            assert_eq!((facets, sheet.point_sets.len()), (triangles, sets), "{mesh}");
             assert!(built.warnings.is_empty(), "{:?}", built.warnings);
         }
     }

@@ -59,8 +59,8 @@ impl Started<'_> {
         let Tied { meshed, surfaces, curved, .. } = tied;
         let Meshed { context, assembly, cells, bodies, .. } = meshed;
         let Context { out: warnings, mut notes, .. } = context;
-        let mut told = HashSet::new();
-        notes.retain(|note| told.insert(note.clone()));
+        let mut reported = HashSet::new();
+        notes.retain(|note| reported.insert(note.clone()));
         let model = Arc::clone(&assembly.model);
         let implicit = start.map(|start| {
             Arc::new(ImplicitBodies { model: Arc::new(assembly), cells, control, start, surface: curved })
@@ -84,18 +84,19 @@ impl Checked<'_> {
     /// Displacements [m] of all nodes at the start, if some body has some.
     fn initial_displacement(&mut self) -> Option<Vec<Vector3>> {
         let scene = self.scene;
-        let mut all = None;
+        let mut displacement = None;
         for (body, (name, table)) in scene.bodies.iter().enumerate() {
             let Some(wanted) = &table.initial_displacement else { continue };
             let nodes: Vec<u32> = self.assembly.bodies[body].all_nodes().collect();
             let path = ["body", name.as_str(), "initial-displacement"];
             let given = self.node_vectors(wanted, body, &nodes, &path)?;
-            let all = all.get_or_insert_with(|| vec![Vector3::zeros(); self.assembly.rest.len()]);
+            let displacement =
+                displacement.get_or_insert_with(|| vec![Vector3::zeros(); self.assembly.rest.len()]);
             for (&node, vector) in nodes.iter().zip(given) {
-                all[node as usize] = Vector3::from(vector);
+                displacement[node as usize] = Vector3::from(vector);
             }
         }
-        all
+        displacement
     }
 
     /// The state that a run of an implicit solver starts from.
@@ -107,8 +108,8 @@ impl Checked<'_> {
             let positions: Vec<Vector3> = assembly.places().zip(displacement).map(|(x, u)| x + u).collect();
             start.set_positions(assembly, &positions);
         }
-        for (own, given) in start.velocity.iter_mut().zip(&assembly.initial_velocity) {
-            *own = Vector3::from(*given);
+        for (velocity, given) in start.velocity.iter_mut().zip(&assembly.initial_velocity) {
+            *velocity = Vector3::from(*given);
         }
         // A static run goes there in its first load step.
         if self.scene.run.solver == SolverName::Static {

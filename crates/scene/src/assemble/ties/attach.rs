@@ -55,7 +55,7 @@ pub(crate) fn attach(
     let names = &table.between;
     let tolerance = table.tolerance.unwrap_or(GAP * median_edge(&host.body.mesh));
     let locator = host.body.locator();
-    let own = &host.model.bodies[host.index];
+    let host_body = &host.model.bodies[host.index];
     let (mut tied, mut rows, mut cells, mut left) = (Vec::new(), Vec::new(), Vec::new(), 0);
     let (mut widest, mut farthest, mut nearest) = (0.0_f64, (0.0_f64, [0.0; 3]), f64::INFINITY);
     for &node in nodes {
@@ -72,7 +72,7 @@ pub(crate) fn attach(
         widest = widest.max(found.distance);
         tied.push(node);
         cells.push(CellId { kind: found.kind, index: found.cell });
-        rows.push(found.weights.iter().map(|&(node, w)| (own.node(node), w)).collect::<Vec<_>>());
+        rows.push(found.weights.iter().map(|&(node, w)| (host_body.node(node), w)).collect::<Vec<_>>());
     }
     let gap = format!("{} m", number(tolerance));
     let help = "move one of them (`at`), or give a larger `tolerance` in metres";

@@ -163,9 +163,9 @@ impl Meshed<'_> {
     /// Says how much of a solid a wall inside it takes: the solid is not removed there.
     fn tell_crowding(&mut self, [guest, host]: [usize; 2], names: &[String; 2]) {
         let volume = |body: usize, walls: bool| -> f64 {
-            let own = self.assembly.solids.iter().filter(|solid| solid.body == body);
-            let own = own.filter(|solid| matches!(solid.cells, Cells::Membrane(..)) == walls);
-            own.map(|solid| (0..solid.cells.len()).map(|cell| solid.cells.volume(cell)).sum::<f64>()).sum()
+            let solids = self.assembly.solids.iter().filter(|solid| solid.body == body);
+            let solids = solids.filter(|solid| matches!(solid.cells, Cells::Membrane(..)) == walls);
+            solids.map(|solid| (0..solid.cells.len()).map(|cell| solid.cells.volume(cell)).sum::<f64>()).sum()
         };
         let shells: f64 = match self.shell_cells(guest) {
             Some(cells) => cells

@@ -71,7 +71,8 @@ impl Meshed<'_> {
         points: &Attached,
     ) -> Result<MortarRows, Refusal> {
         let names = &table.between;
-        let bodies = names.iter().filter_map(|name| self.scene.bodies.iter().find(|(own, _)| own == name));
+        let bodies =
+            names.iter().filter_map(|name| self.scene.bodies.iter().find(|(known, _)| known == name));
         if let Some((wall, table)) = bodies.into_iter().find(|(_, table)| table.model != BodyModel::Solid) {
             let model = table.model.word();
             let message = format!("`{wall}` is a {model}, and `mortar` joins faces of solids");
@@ -81,16 +82,17 @@ impl Meshed<'_> {
                 help: "take `method = \"points\"`",
             });
         }
-        let own = &self.assembly.bodies[guest];
+        let guest_body = &self.assembly.bodies[guest];
         let selected: BTreeSet<u32> = selected.iter().copied().collect();
         let tied: BTreeSet<u32> = points.nodes.iter().copied().collect();
-        let is_selected = |face: &&Face| face.nodes().iter().all(|&node| selected.contains(&own.node(node)));
+        let is_selected =
+            |face: &&Face| face.nodes().iter().all(|&node| selected.contains(&guest_body.node(node)));
         let [BuiltBody { boundary, mesh, .. }, other] = [guest, host].map(|body| &self.bodies[body]);
         let faces: Vec<Face> = boundary.faces.iter().filter(is_selected).copied().collect();
         let found = mortar_rows(
             MortarSide { faces: &faces, points: &mesh.points },
             MortarSide { faces: &other.boundary.faces, points: &other.mesh.points },
-            |node| tied.contains(&own.node(node)),
+            |node| tied.contains(&guest_body.node(node)),
             table.tolerance.unwrap_or(GAP * median_edge(&other.mesh)),
         );
         if found.rows.is_empty() {
@@ -99,7 +101,7 @@ impl Meshed<'_> {
             let help = "select whole faces (`nodes`), or take `method = \"points\"`";
             return Err(Refusal { message, label: "no faces", help });
         }
-        let has_other = |(other, own): &&(String, TieTable)| other != name && own.between.contains(&names[0]);
+        let has_other = |(other, tie): &&(String, TieTable)| other != name && tie.between.contains(&names[0]);
         if found.rows.iter().any(|row| !row.own.is_empty())
             && let Some((other, _)) = self.scene.ties.iter().find(has_other)
         {
@@ -124,8 +126,8 @@ impl Meshed<'_> {
         {
             return false;
         }
-        let all: Vec<u32> = (0..boundary.faces.len() as u32).collect();
-        let surface = SurfaceLocator::new(boundary, &all, &mesh.points);
+        let face_numbers: Vec<u32> = (0..boundary.faces.len() as u32).collect();
+        let surface = SurfaceLocator::new(boundary, &face_numbers, &mesh.points);
         points.nodes.iter().all(|&node| {
             let place = Vector3::from(self.assembly.rest[node as usize]);
             surface.closest(&place).is_some_and(|found| (found.position - place).norm() <= most)
@@ -134,8 +136,8 @@ impl Meshed<'_> {
 
     /// The nodes that were found but have no row.
     fn left_out(&self, joint: Joint<'_>, points: &Attached, found: &MortarRows) -> Vec<u32> {
-        let own = &self.assembly.bodies[joint.guest];
-        let joined: BTreeSet<u32> = found.rows.iter().map(|row| own.node(row.node)).collect();
+        let guest_body = &self.assembly.bodies[joint.guest];
+        let joined: BTreeSet<u32> = found.rows.iter().map(|row| guest_body.node(row.node)).collect();
         points.nodes.iter().filter(|node| !joined.contains(node)).copied().collect()
     }
 
@@ -179,12 +181,12 @@ impl Meshed<'_> {
             let help = "name the other body first, or refine the first one";
             self.out.push(Diagnostic::warning(message).at(at, "not joined there").help(help));
         }
-        let [own, other] = [guest, host].map(|body| &self.assembly.bodies[body]);
+        let [guest_body, other] = [guest, host].map(|body| &self.assembly.bodies[body]);
         let mesh = &self.bodies[host].mesh;
         let (locator, rounding) = (Locator::new(mesh), ROUNDING * median_edge(mesh));
         let in_model = |MortarRow { node, followed, own: apart, offset }: &MortarRow| {
             let mut row: Vec<(u32, f64)> = followed.iter().map(|&(node, w)| (other.node(node), w)).collect();
-            let place = Vector3::from(self.assembly.rest[own.node(*node) as usize]);
+            let place = Vector3::from(self.assembly.rest[guest_body.node(*node) as usize]);
             if offset.norm() > rounding {
                 // The displacement is continued over the offset by the gradient of the cells there.
                 for (at, sign) in [(place, 1.0), (place - offset, -1.0)] {
@@ -200,11 +202,11 @@ impl Meshed<'_> {
                 }
                 row.retain(|(_, weight)| *weight != 0.0);
             }
-            row.extend(apart.iter().map(|&(node, w)| (own.node(node), w)));
+            row.extend(apart.iter().map(|&(node, w)| (guest_body.node(node), w)));
             row
         };
         let rows: Vec<Vec<(u32, f64)>> = found.rows.iter().map(in_model).collect();
-        let nodes: Vec<u32> = found.rows.iter().map(|row| own.node(row.node)).collect();
+        let nodes: Vec<u32> = found.rows.iter().map(|row| guest_body.node(row.node)).collect();
         let note = format!(
             "`{name}`: faces of `{}` with {} tied nodes lie on `{}` (mortar), with gaps of at most {} m",
             names[0],

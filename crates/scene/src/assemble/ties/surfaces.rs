@@ -90,7 +90,7 @@ impl Tied<'_> {
     }
 
     fn carry(&mut self, body: usize, name: &str, surface: &Mesh) -> Weights {
-        let own = &self.assembly.bodies[body];
+        let model_body = &self.assembly.bodies[body];
         let locator = self.bodies[body].locator();
         let mut farthest = 0.0_f64;
         let mut row = Vec::new();
@@ -99,7 +99,7 @@ impl Tied<'_> {
             row.clear();
             if let Some(location) = locator.locate(&point) {
                 farthest = farthest.max(location.distance);
-                row.extend(location.weights.iter().map(|&(node, weight)| (own.node(node), weight)));
+                row.extend(location.weights.iter().map(|&(node, weight)| (model_body.node(node), weight)));
             }
             rows.push(row.clone());
         }
@@ -132,9 +132,10 @@ mod tests {
     /// Some nodes lie beyond the body, and some points beyond the cubes.
     #[test]
     fn the_smooth_surface_of_immersed_cubes_follows_them_and_gives_its_forces_back() {
-        let own = CUBE.lines().find(|line| line.starts_with("mesh")).unwrap();
+        let mesh_line = CUBE.lines().find(|line| line.starts_with("mesh")).unwrap();
         let shape = "ellipsoid = { radii = [0.05, 0.04, 0.03] }";
-        let text = CUBE.replace(own, &format!("mesh = {{ {shape}, edge = 0.012, as = 'immersed-hexes' }}"));
+        let text =
+            CUBE.replace(mesh_line, &format!("mesh = {{ {shape}, edge = 0.012, as = 'immersed-hexes' }}"));
         let text = text.replace("{ set = \"z-min\" }", "{ box = [[-1, -1, -1], [1, 1, -0.02]] }");
         let built =
             built_alone(&format!("{text}[surface.skin]\non = 'cube'\nmesh = {{ {shape}, edge = 0.004 }}\n"));

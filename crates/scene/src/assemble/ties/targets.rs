@@ -40,8 +40,8 @@ impl Tied<'_> {
     ) -> Option<Vec<Face>> {
         let result = match target {
             Subject::Body(body) => {
-                let (built, own) = (&self.bodies[body], &self.assembly.bodies[body]);
-                select_faces(selection, &built.mesh, &built.boundary, |node| own.node(node))
+                let (built, model_body) = (&self.bodies[body], &self.assembly.bodies[body]);
+                select_faces(selection, &built.mesh, &built.boundary, |node| model_body.node(node))
             }
             Subject::Surface(index) => {
                 let (mesh, boundary) = self.surface_mesh(index);
@@ -66,8 +66,8 @@ fn select_faces(
 ) -> Result<Vec<Face>, String> {
     let face = |index: u32| {
         let mut face = [NO_NODE; 4];
-        for (own, &node) in face.iter_mut().zip(boundary.faces[index as usize].nodes()) {
-            *own = number(node);
+        for (numbered, &node) in face.iter_mut().zip(boundary.faces[index as usize].nodes()) {
+            *numbered = number(node);
         }
         face
     };

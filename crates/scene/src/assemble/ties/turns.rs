@@ -27,7 +27,7 @@ impl Meshed<'_> {
 
     /// Returns the rotation of a node with cells of a solid: with the mean of their gradients, by volume.
     pub(super) fn turn(&self, host: usize, node: u32, cells: &[CellId]) -> CarriedTurn {
-        let (mesh, own) = (&self.bodies[host].mesh, &self.assembly.bodies[host]);
+        let (mesh, host_body) = (&self.bodies[host].mesh, &self.assembly.bodies[host]);
         let mut gradient: Vec<(u32, Vector3)> = Vec::new();
         let mut whole = 0.0;
         for cell in cells {
@@ -37,7 +37,7 @@ impl Meshed<'_> {
             let (volume, integrals) = gradient_integrals(cell.kind, &places);
             whole += volume;
             for (&corner, integral) in corners.iter().zip(integrals) {
-                let corner = own.node(corner);
+                let corner = host_body.node(corner);
                 match gradient.iter_mut().find(|(known, _)| *known == corner) {
                     Some((_, sum)) => *sum += integral,
                     None => gradient.push((corner, integral)),
