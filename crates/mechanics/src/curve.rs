@@ -147,8 +147,8 @@ mod tests {
     #[test]
     fn curves_from_rest_begin_at_zero_and_are_the_same_later() {
         let table = |points: &[(f64, f64)]| Shape::Table(points.to_vec());
-        let all = [Shape::Hold, table(&[(0.0, 0.5), (0.5, 1.0), (2.0, -1.0)]), table(&[(0.7, -0.3)])];
-        for shape in all {
+        let shapes = [Shape::Hold, table(&[(0.0, 0.5), (0.5, 1.0), (2.0, -1.0)]), table(&[(0.7, -0.3)])];
+        for shape in shapes {
             let curve = Curve { shape, from: 0.0, to: 1.25 };
             let eased = curve.clone().from_rest(0.25);
             assert_eq!(eased.value(0.0), 0.0);

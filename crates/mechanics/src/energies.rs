@@ -26,7 +26,7 @@ pub struct Energies {
 
 impl Energies {
     /// The sum of energies, and the worst of their balances.
-    pub fn total(all: impl Iterator<Item = Self>) -> Self {
+    pub fn total(energies: impl Iterator<Item = Self>) -> Self {
         let add = |a: Self, b: Self| Self {
             kinetic: a.kinetic + b.kinetic,
             internal: a.internal + b.internal,
@@ -36,6 +36,6 @@ impl Energies {
             step_changes: a.step_changes + b.step_changes,
             balance: a.balance.max(b.balance),
         };
-        all.reduce(add).unwrap_or_default()
+        energies.reduce(add).unwrap_or_default()
     }
 }

@@ -30,8 +30,8 @@ impl Model {
                 return Err(TieError::Twice { node, body, other: other.into() });
             }
         }
-        let all = || self.ties.iter().chain([&tie]);
-        let chained = all().flat_map(Tie::rows).find_map(|(node, mut row)| {
+        let ties = || self.ties.iter().chain([&tie]);
+        let chained = ties().flat_map(Tie::rows).find_map(|(node, mut row)| {
             row.find_map(|(followed, _)| owner[followed as usize]).map(|other| (node, other))
         });
         if let Some((node, other)) = chained {
@@ -55,18 +55,21 @@ impl Model {
     /// symmetry. To be called once constraints and ties are there.
     pub fn prescribe_tied(&mut self) {
         let mut held = vec![[false; 3]; self.node_count()];
-        for constraint in self.constraints.iter().filter(|own| !own.motion.is_collective()) {
+        for constraint in self.constraints.iter().filter(|constraint| !constraint.motion.is_collective()) {
             for &node in &constraint.nodes {
-                for (own, by) in held[node as usize].iter_mut().zip(constraint.components) {
-                    *own |= by;
+                for (is_held, by) in held[node as usize].iter_mut().zip(constraint.components) {
+                    *is_held |= by;
                 }
             }
         }
         let bodies = &self.bodies;
         for tie in &mut self.ties {
             let both = |(node, row): (u32, Vec<u32>)| {
-                let own = bodies.iter().find(|body| body.nodes.contains(&node)).map(|body| &body.nodes);
-                let others = || row.iter().filter(|other| own.is_none_or(|own| !own.contains(other)));
+                let body_nodes =
+                    bodies.iter().find(|body| body.nodes.contains(&node)).map(|body| &body.nodes);
+                let others = || {
+                    row.iter().filter(|other| body_nodes.is_none_or(|body_nodes| !body_nodes.contains(other)))
+                };
                 [0, 1, 2].map(|c| held[node as usize][c] && others().any(|&other| held[other as usize][c]))
             };
             let rows = tie.rows().map(|(node, row)| (node, row.map(|(other, _)| other).collect()));
@@ -131,31 +134,31 @@ impl Model {
     /// as |J_ai| Σ_j |J_aj| k_a.
     pub fn give_down_stiffness(&self, stiffness: &mut [f64]) {
         for (node, row) in self.ties.iter().flat_map(Tie::rows) {
-            let own = std::mem::take(&mut stiffness[node as usize]);
+            let taken = std::mem::take(&mut stiffness[node as usize]);
             let row: Vec<(u32, f64)> = row.collect();
             let sum: f64 = row.iter().map(|(_, weight)| weight.abs()).sum();
             for (followed, weight) in row {
-                stiffness[followed as usize] += weight.abs() * sum * own;
+                stiffness[followed as usize] += weight.abs() * sum * taken;
             }
         }
     }
 
     /// A point of nodes with weights as a combination of nodes that follow no others.
     pub fn resolved(&self, point: &[(u32, f64)]) -> Vec<(u32, f64)> {
-        let mut all: Vec<(u32, f64)> = Vec::new();
+        let mut combined: Vec<(u32, f64)> = Vec::new();
         for &(node, weight) in point {
             let found = self.ties.iter().find_map(|tie| {
-                let at = tie.nodes.iter().position(|&own| own == node)?;
+                let at = tie.nodes.iter().position(|&tied| tied == node)?;
                 Some(tie.mapping.row(at).map(|(followed, w)| (followed, w * weight)).collect::<Vec<_>>())
             });
             for (node, weight) in found.unwrap_or_else(|| vec![(node, weight)]) {
-                match all.iter_mut().find(|(known, _)| *known == node) {
+                match combined.iter_mut().find(|(known, _)| *known == node) {
                     Some((_, known)) => *known += weight,
-                    None => all.push((node, weight)),
+                    None => combined.push((node, weight)),
                 }
             }
         }
-        all
+        combined
     }
 }
 

@@ -66,13 +66,14 @@ pub fn check<S>(
         let (mut power, mut sum, mut moment) = (0.0, [0.0; 3], [0.0; 3]);
         // Of the parts that are summed up.
         let mut sizes = [0.0; 3];
-        mapping.add_force(state, point, force, &mut |at, own, turning| {
+        mapping.add_force(state, point, force, &mut |at, share, turning| {
             let [x, v, w] = node(at);
-            power += dot(v, own) + dot(w, turning);
-            sum = add(sum, own);
-            moment = add(moment, add(cross(x, own), turning));
-            let [x, v, w, own, turning] = [x, v, w, own, turning].map(|vector| dot(vector, vector).sqrt());
-            sizes = add(sizes, [v * own + w * turning, own, x * own + turning]);
+            power += dot(v, share) + dot(w, turning);
+            sum = add(sum, share);
+            moment = add(moment, add(cross(x, share), turning));
+            let [x, v, w, share, turning] =
+                [x, v, w, share, turning].map(|vector| dot(vector, vector).sqrt());
+            sizes = add(sizes, [v * share + w * turning, share, x * share + turning]);
         });
         let moved = sub(mapping.position(after, point), mapping.position(before, point));
         let largest = |v: Vector<f64>| v.iter().fold(0.0_f64, |most, x| most.max(x.abs()));

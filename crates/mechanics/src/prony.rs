@@ -157,8 +157,8 @@ impl Prony {
     /// Σ hᵢ [Pa] of both parts, from the tensors that a point remembers.
     pub fn lag(&self, history: impl Iterator<Item = Symmetric<f64>>) -> Symmetric<f64> {
         // Each part begins with Φⁿ⁻¹.
-        let own = history.enumerate().filter(|(slot, _)| ![0, self.isochoric_slots()].contains(slot));
-        own.fold(Symmetric::ZERO, |sum, (_, h)| sum + h)
+        let stresses = history.enumerate().filter(|(slot, _)| ![0, self.isochoric_slots()].contains(slot));
+        stresses.fold(Symmetric::ZERO, |sum, (_, h)| sum + h)
     }
 
     /// The averaged pressure [Pa] at the instant the history belongs to.

@@ -34,8 +34,8 @@ impl Tie {
         self.rows().zip(&self.held).map(|((node, row), held)| {
             let followed =
                 row.map(|(other, weight)| (other, held.map(|held| if held { 0.0 } else { weight })));
-            let own = held.map(|held| f64::from(u8::from(held)));
-            (node, followed.chain((own != [0.0; 3]).then_some((node, own))))
+            let on_itself = held.map(|held| f64::from(u8::from(held)));
+            (node, followed.chain((on_itself != [0.0; 3]).then_some((node, on_itself))))
         })
     }
 }

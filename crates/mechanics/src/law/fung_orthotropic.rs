@@ -151,8 +151,9 @@ impl Law for FungOrthotropic {
     }
 
     fn shader(&self) -> Option<Shader> {
-        let own = [&[self.modulus], &self.normal.0[..], &self.shear, self.axes.0.as_flattened()].concat();
-        Some(self.volumetric.shader(&[include_str!("fung_orthotropic.wgsl")], &own))
+        let parameters =
+            [&[self.modulus], &self.normal.0[..], &self.shear, self.axes.0.as_flattened()].concat();
+        Some(self.volumetric.shader(&[include_str!("fung_orthotropic.wgsl")], &parameters))
     }
 
     /// The shear modulus is the largest over all shears at rest, and the bulk modulus belongs to a pure

@@ -227,14 +227,14 @@ macro_rules! registry {
 
             /// Name in a scene file, or name of a user's [own law](OwnLaw).
             pub fn name(&self) -> &'static str {
-                match self { $(Self::$law(_) => $name,)* Self::Own(own) => own.name() }
+                match self { $(Self::$law(_) => $name,)* Self::Own(law) => law.name() }
             }
 
             /// True if an element may average the change of volume; see [`Law::VOLUMETRIC_ENERGY`].
             pub fn has_volumetric_energy(&self) -> bool {
                 match self {
                     $(Self::$law(_) => <$law as Law>::VOLUMETRIC_ENERGY,)*
-                    Self::Own(own) => own.has_volumetric_energy(),
+                    Self::Own(law) => law.has_volumetric_energy(),
                 }
             }
         }

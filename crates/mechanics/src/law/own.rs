@@ -120,25 +120,25 @@ fn given<R: Number>(deformation: &Deformation<R>, fibres: &[Vector<R>]) -> [R; G
         deformation.isochoric_change,
     ];
     let tensors = gradient.0.iter().flatten().chain(&strain_twice.0).chain(&inverse_strain.0);
-    let mut all = [R::ZERO; GIVEN];
+    let mut flat = [R::ZERO; GIVEN];
     let numbers = tensors.chain(&measures).chain(fibres.iter().flatten());
-    all.iter_mut().zip(numbers).for_each(|(to, from)| *to = *from);
-    all
+    flat.iter_mut().zip(numbers).for_each(|(to, from)| *to = *from);
+    flat
 }
 
-fn taken(all: &[f64; GIVEN]) -> (Deformation<f64>, [Vector<f64>; MOST_FAMILIES]) {
-    let three = |at: usize| [all[at], all[at + 1], all[at + 2]];
-    let six = |at: usize| Symmetric(std::array::from_fn(|k| all[at + k]));
+fn taken(flat: &[f64; GIVEN]) -> (Deformation<f64>, [Vector<f64>; MOST_FAMILIES]) {
+    let three = |at: usize| [flat[at], flat[at + 1], flat[at + 2]];
+    let six = |at: usize| Symmetric(std::array::from_fn(|k| flat[at + k]));
     let inverse_strain = six(15);
     let deformation = Deformation {
         gradient: Tensor([three(0), three(3), three(6)]),
         strain_twice: six(9),
         inverse_strain,
         inverse_cauchy_green: (-inverse_strain).plus_isotropic(1.0),
-        volume_ratio: all[21],
-        volume_change: all[22],
-        isochoric_factor: all[23],
-        isochoric_change: all[24],
+        volume_ratio: flat[21],
+        volume_change: flat[22],
+        isochoric_factor: flat[23],
+        isochoric_change: flat[24],
     };
     (deformation, std::array::from_fn(|family| three(25 + 3 * family)))
 }
@@ -146,8 +146,8 @@ fn taken(all: &[f64; GIVEN]) -> (Deformation<f64>, [Vector<f64>; MOST_FAMILIES])
 impl Law for Own {
     fn energy<R: Number>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> Split<R> {
         let families = fibres.len().min(MOST_FAMILIES);
-        let [isochoric, volumetric] = R::lane_by_lane(given(deformation, fibres), |all| {
-            let (deformation, fibres) = taken(&all);
+        let [isochoric, volumetric] = R::lane_by_lane(given(deformation, fibres), |flat| {
+            let (deformation, fibres) = taken(&flat);
             let energy = self.0.energy(&deformation, &fibres[..families]);
             [energy.isochoric, energy.volumetric]
         });
@@ -156,8 +156,8 @@ impl Law for Own {
 
     fn stress<R: Number>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> Split<Symmetric<R>> {
         let families = fibres.len().min(MOST_FAMILIES);
-        let both: [R; 12] = R::lane_by_lane(given(deformation, fibres), |all| {
-            let (deformation, fibres) = taken(&all);
+        let both: [R; 12] = R::lane_by_lane(given(deformation, fibres), |flat| {
+            let (deformation, fibres) = taken(&flat);
             let Split { isochoric, volumetric } = self.0.stress(&deformation, &fibres[..families]);
             std::array::from_fn(|k| if k < 6 { isochoric.0[k] } else { volumetric.0[k - 6] })
         });

@@ -301,8 +301,8 @@ mod tests {
             parameters["poisson-ratio"] = json!(0.5);
             parameters
         };
-        let mut all = every_law();
-        all.extend([
+        let mut laws = every_law();
+        laws.extend([
             neo_hookean(),
             mooney_rivlin(0.4, 0.1),
             of("yeoh", half(json!({ "c1": 0.3, "c2": 0.1, "c3": 0.05 }))),
@@ -318,7 +318,7 @@ mod tests {
                 })),
             ),
         ]);
-        all
+        laws
     }
 
     fn fibres(law: &AnyLaw) -> &'static [Vector<f64>] {

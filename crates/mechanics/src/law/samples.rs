@@ -109,8 +109,10 @@ pub fn own() -> AnyLaw {
 /// # Panics
 /// If one of them is no table.
 pub fn merged(mut parameters: Value, extra: Value) -> Value {
-    let (Value::Object(all), Value::Object(extra)) = (&mut parameters, extra) else { panic!("not a table") };
-    all.extend(extra);
+    let (Value::Object(entries), Value::Object(extra)) = (&mut parameters, extra) else {
+        panic!("not a table")
+    };
+    entries.extend(extra);
     parameters
 }
 

@@ -82,9 +82,8 @@ impl Volumetric {
         deformation.inverse_cauchy_green * self.kirchhoff_pressure(deformation)
     }
 
-    /// A law with this energy in WGSL. `snippets` and `own` are the rest of its text, and its parameters from
-    /// index 1 on.
-    pub(super) fn shader(&self, snippets: &[&str], own: &[f64]) -> Shader {
+    /// A law with this energy in WGSL. `snippets` are the rest of its text, `parameters` those from index 1 on.
+    pub(super) fn shader(&self, snippets: &[&str], parameters: &[f64]) -> Shader {
         let pressure = match self.energy {
             VolumetricEnergy::Quadratic => "j * x",
             VolumetricEnergy::QuadLog => "0.5 * x * (j + 1.0)",
@@ -94,7 +93,7 @@ impl Volumetric {
         let pressure =
             format!("fn relative_kirchhoff_pressure(j: f32, x: f32) -> f32 {{\n    return {pressure};\n}}\n");
         let shared = [pressure.as_str(), include_str!("volumetric.wgsl")];
-        Shader::new(&[&shared, snippets].concat(), &[&[self.bulk], own].concat())
+        Shader::new(&[&shared, snippets].concat(), &[&[self.bulk], parameters].concat())
     }
 
     /// J² U″(J) [Pa] at a volume ratio: κ at rest; what the volume adds to ρc² of the deformed solid.

@@ -86,8 +86,8 @@ pub struct Body {
 impl Body {
     /// Returns the model's number of a node of its mesh: first the body's nodes, then the shared ones.
     pub fn node(&self, index: u32) -> u32 {
-        let own = self.nodes.len() as u32;
-        if index < own { self.nodes.start + index } else { self.shared[(index - own) as usize] }
+        let own_count = self.nodes.len() as u32;
+        if index < own_count { self.nodes.start + index } else { self.shared[(index - own_count) as usize] }
     }
 
     /// The nodes of its mesh, numbered in the model.
@@ -362,8 +362,8 @@ impl Model {
             let LoadKind::Gravity { body, acceleration } = load.kind else { continue };
             let acceleration = scale(acceleration, load.curve.value(time));
             for node in self.bodies[body].nodes.clone() {
-                let own = &mut weights[node as usize];
-                *own = add(*own, scale(acceleration, self.mass[node as usize]));
+                let weight = &mut weights[node as usize];
+                *weight = add(*weight, scale(acceleration, self.mass[node as usize]));
             }
         }
         weights
@@ -379,18 +379,18 @@ impl Model {
         let mut amplitudes = vec![[[0.0; 2]; 3]; self.node_count()];
         let alone = |(_, constraint): &(usize, &Constraint)| !constraint.motion.is_collective();
         for (index, constraint) in self.constraints.iter().enumerate().filter(alone) {
-            for (&node, own) in constraint.nodes.iter().zip(constraint.amplitudes()) {
+            for (&node, given) in constraint.nodes.iter().zip(constraint.amplitudes()) {
                 for component in (0..3).filter(|&c| constraint.components[c]) {
-                    let own = self::component(&own, component);
+                    let amplitude = self::component(&given, component);
                     let owner = &mut owners[node as usize][component];
                     let known = &mut amplitudes[node as usize][component];
                     if *owner == FREE {
-                        (*owner, *known) = (index as u32, own);
+                        (*owner, *known) = (index as u32, amplitude);
                         continue;
                     }
                     let first = &self.constraints[*owner as usize];
                     let still = *known == [0.0; 2];
-                    if *known != own || !(still || first.motion.follows(&constraint.motion)) {
+                    if *known != amplitude || !(still || first.motion.follows(&constraint.motion)) {
                         return Err(self.contradiction([*owner, index as u32], node, component));
                     }
                 }
@@ -401,8 +401,8 @@ impl Model {
         for tie in &self.ties {
             for (&node, held) in tie.nodes.iter().zip(&tie.held) {
                 let alone = owners[node as usize].into_iter().zip(0..).filter(|&(_, c)| !held[c]);
-                let own = alone.chain([(bound[node as usize], 0)]);
-                if let Some((first, component)) = own.into_iter().find(|&(first, _)| first != FREE) {
+                let owned = alone.chain([(bound[node as usize], 0)]);
+                if let Some((first, component)) = owned.into_iter().find(|&(first, _)| first != FREE) {
                     let first = self.constraints[first as usize].name.clone();
                     let (body, node) = self.locate_node(node);
                     let (second, body) = (tie.name.clone(), self.bodies[body].name.clone());
@@ -441,11 +441,17 @@ impl Model {
     /// Checks that no two constraints turn a node differently.
     fn check_rotations(&self) -> Result<(), Contradiction> {
         let turned = |constraint: &Constraint| constraint.components[3..].contains(&true);
-        if !self.constraints.iter().any(|own| turned(own) && matches!(own.motion, Motion::Turn { .. })) {
+        if !self
+            .constraints
+            .iter()
+            .any(|constraint| turned(constraint) && matches!(constraint.motion, Motion::Turn { .. }))
+        {
             return Ok(());
         }
         let mut owners = vec![[FREE; 3]; self.node_count()];
-        for (index, constraint) in self.constraints.iter().enumerate().filter(|(_, own)| turned(own)) {
+        for (index, constraint) in
+            self.constraints.iter().enumerate().filter(|(_, constraint)| turned(constraint))
+        {
             for &node in &constraint.nodes {
                 for c in (0..3).filter(|&c| constraint.components[3 + c]) {
                     let owner = &mut owners[node as usize][c];
@@ -471,9 +477,9 @@ impl Model {
     pub fn amplitudes(&self, owners: &[[u32; 3]]) -> Vec<Amplitudes> {
         let mut amplitudes = vec![Amplitudes::default(); self.node_count()];
         for (index, constraint) in self.constraints.iter().enumerate() {
-            for (&node, own) in constraint.nodes.iter().zip(constraint.amplitudes()) {
+            for (&node, given) in constraint.nodes.iter().zip(constraint.amplitudes()) {
                 for c in (0..3).filter(|&c| owners[node as usize][c] == index as u32) {
-                    for (to, from) in amplitudes[node as usize].iter_mut().zip(own) {
+                    for (to, from) in amplitudes[node as usize].iter_mut().zip(given) {
                         to[c] = from[c];
                     }
                 }
