@@ -123,9 +123,9 @@ impl ImplicitBodies {
     pub(crate) fn cell(&self, number: usize) -> Option<(usize, u32)> {
         let facets = self.model.facets.len();
         if number < facets {
-            let own = number as u32;
+            let facet = number as u32;
             return self.cells.iter().enumerate().find_map(|(body, cells)| match cells {
-                BodyCells::Facets(range) if range.contains(&own) => Some((body, own - range.start)),
+                BodyCells::Facets(range) if range.contains(&facet) => Some((body, facet - range.start)),
                 _ => None,
             });
         }

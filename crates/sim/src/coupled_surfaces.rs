@@ -102,8 +102,8 @@ struct CoupledNode {
 }
 
 impl CoupledNode {
-    fn place(&self, own: &dyn Participant) -> Vector<f64> {
-        add(self.rest, own.displacement(self.node as usize))
+    fn place(&self, participant: &dyn Participant) -> Vector<f64> {
+        add(self.rest, participant.displacement(self.node as usize))
     }
 
     /// True if contacts push the node.
@@ -120,7 +120,7 @@ impl CoupledNode {
 /// Ranges of the coupled nodes of a set among all coupled nodes, and among the coupled nodes of its host.
 #[derive(Clone)]
 struct Places {
-    all: Range<usize>,
+    among_all: Range<usize>,
     at_host: Range<usize>,
 }
 
@@ -157,7 +157,8 @@ impl Meetings {
             let (host, of) = (&parts[set.host], &parts[set.of]);
             let at_host = counts[set.host]..counts[set.host] + set.nodes.len();
             counts[set.host] = at_host.end;
-            let [first, end] = [at_host.start, at_host.end].map(|own| (host.model.node_count() + own) as u32);
+            let [first, end] =
+                [at_host.start, at_host.end].map(|number| (host.model.node_count() + number) as u32);
             let rest = |node: u32| of.model.rest[node as usize];
             let areas = areas(host, &(first..end), |node| rest(set.nodes[(node - first) as usize]));
             let unit = FIRM / (host.steps.step * of.steps.step) * mass_per_area(host, &(first..end));
@@ -167,7 +168,10 @@ impl Meetings {
                     "has contact nodes without a face, or the other participant has no surface that they touch",
                 ));
             }
-            places.push(Places { all: coupled_nodes.len()..coupled_nodes.len() + set.nodes.len(), at_host });
+            places.push(Places {
+                among_all: coupled_nodes.len()..coupled_nodes.len() + set.nodes.len(),
+                at_host,
+            });
             coupled_nodes.extend(set.nodes.iter().zip(areas).map(|(&node, area)| CoupledNode {
                 node,
                 rest: rest(node),
@@ -214,12 +218,13 @@ impl Meetings {
     /// Prepares the first pass of a step from where all participants meet: forces and places to be expected,
     /// so that forces can be found there.
     pub(crate) fn meet(&mut self, parts: &[ParticipantSetup], participants: &mut [Box<dyn Participant>]) {
-        for (set, Places { all, .. }) in self.sets.iter().zip(&self.places) {
-            let (step, own) = (parts[set.of].steps.step, participants[set.of].as_ref());
-            let remembered = &self.memory.nodes[all.clone()];
-            for (coupled, &[force, owed]) in self.coupled_nodes[all.clone()].iter_mut().zip(remembered) {
-                let here = coupled.place(own);
-                coupled.anchor = add(here, scale(own.last_velocity(coupled.node as usize), step));
+        for (set, Places { among_all, .. }) in self.sets.iter().zip(&self.places) {
+            let (step, participant) = (parts[set.of].steps.step, participants[set.of].as_ref());
+            let remembered = &self.memory.nodes[among_all.clone()];
+            for (coupled, &[force, owed]) in self.coupled_nodes[among_all.clone()].iter_mut().zip(remembered)
+            {
+                let here = coupled.place(participant);
+                coupled.anchor = add(here, scale(participant.last_velocity(coupled.node as usize), step));
                 coupled.force = add(force, scale(owed, 1.0 / step));
                 coupled.way = [here, coupled.anchor];
             }
@@ -234,8 +239,10 @@ impl Meetings {
         parts: &[ParticipantSetup],
         participants: &mut [Box<dyn Participant>],
     ) {
-        for (_, Places { all, .. }) in self.sets.iter().zip(&self.places).filter(|(set, _)| set.of == part) {
-            for coupled in &mut self.coupled_nodes[all.clone()] {
+        for (_, Places { among_all, .. }) in
+            self.sets.iter().zip(&self.places).filter(|(set, _)| set.of == part)
+        {
+            for coupled in &mut self.coupled_nodes[among_all.clone()] {
                 coupled.way[1] = coupled.place(participants[part].as_ref());
             }
         }
@@ -252,11 +259,13 @@ impl Meetings {
     ) {
         let Self { sets, places, coupled_nodes, ways, .. } = self;
         for (host, participant) in participants.iter_mut().enumerate() {
-            let own = || sets.iter().zip(&*places).filter(|(set, _)| set.host == host);
-            let Some((set, _)) = own().find(|(set, _)| of(set)) else { continue };
+            let of_host = || sets.iter().zip(&*places).filter(|(set, _)| set.host == host);
+            let Some((set, _)) = of_host().find(|(set, _)| of(set)) else { continue };
             ways.clear();
             ways.extend(
-                own().flat_map(|(_, places)| &coupled_nodes[places.all.clone()]).map(|coupled| coupled.way),
+                of_host()
+                    .flat_map(|(_, places)| &coupled_nodes[places.among_all.clone()])
+                    .map(|coupled| coupled.way),
             );
             let begin = participant.time();
             participant.lead_coupled_surfaces([begin, begin + parts[set.of].steps.step], ways);
@@ -265,8 +274,8 @@ impl Meetings {
 
     /// Adds what pushes a participant's nodes to grips.
     pub(crate) fn add_to(&self, part: usize, grips: &mut Vec<Grip>) {
-        let own = self.sets.iter().zip(&self.places).filter(|(set, _)| set.of == part);
-        let coupled_nodes = own.flat_map(|(_, places)| &self.coupled_nodes[places.all.clone()]);
+        let of_part = self.sets.iter().zip(&self.places).filter(|(set, _)| set.of == part);
+        let coupled_nodes = of_part.flat_map(|(_, places)| &self.coupled_nodes[places.among_all.clone()]);
         grips.extend(coupled_nodes.filter(|coupled| coupled.is_pushed()).map(CoupledNode::grip));
     }
 
@@ -279,16 +288,16 @@ impl Meetings {
         participants: &[Box<dyn Participant>],
     ) -> bool {
         let Self { sets, places, coupled_nodes, memory, .. } = self;
-        let impulses = |set: &CoupledSurface, own: &Places| {
-            &participants[set.host].coupled_impulses()[own.at_host.clone()]
+        let impulses = |set: &CoupledSurface, ranges: &Places| {
+            &participants[set.host].coupled_impulses()[ranges.at_host.clone()]
         };
         let mut is_found = true;
-        for (index, (set, own)) in sets.iter().zip(&*places).enumerate() {
+        for (index, (set, ranges)) in sets.iter().zip(&*places).enumerate() {
             let step = parts[set.of].steps.step;
             let (mut apart, mut size, mut sums) = (0.0, 0.0, [[0.0; 3]; 2]);
-            let remembered = &memory.nodes[own.all.clone()];
+            let remembered = &memory.nodes[ranges.among_all.clone()];
             for ((coupled, [_, owed]), &impulse) in
-                coupled_nodes[own.all.clone()].iter().zip(remembered).zip(impulses(set, own))
+                coupled_nodes[ranges.among_all.clone()].iter().zip(remembered).zip(impulses(set, ranges))
             {
                 let (wanted, felt) = (scale(add(impulse, *owed), 1.0 / step), coupled.felt());
                 let difference = sub(wanted, felt);
@@ -300,12 +309,12 @@ impl Meetings {
             is_found &= difference <= FOUND;
         }
         is_found |= pass + 1 == PASSES;
-        for (index, (set, own)) in sets.iter().zip(&*places).enumerate() {
+        for (index, (set, ranges)) in sets.iter().zip(&*places).enumerate() {
             let step = parts[set.of].steps.step;
-            let remembered = memory.nodes[own.all.clone()].iter_mut();
+            let remembered = memory.nodes[ranges.among_all.clone()].iter_mut();
             let mut touches = false;
             for ((coupled, [force, owed]), &impulse) in
-                coupled_nodes[own.all.clone()].iter_mut().zip(remembered).zip(impulses(set, own))
+                coupled_nodes[ranges.among_all.clone()].iter_mut().zip(remembered).zip(impulses(set, ranges))
             {
                 let mean = scale(impulse, 1.0 / step);
                 touches |= mean != [0.0; 3] || coupled.is_pushed();
@@ -392,8 +401,8 @@ impl CoupledSurface {
 /// Contacts of a host whose surfaces have nodes of a set.
 fn surfaces<'a>(host: &'a ParticipantSetup, coupled_nodes: &Range<u32>) -> impl Iterator<Item = &'a Contact> {
     let coupled_nodes = coupled_nodes.clone();
-    let all = host.method.contacts().into_iter().flat_map(|contacts| &contacts.contacts);
-    all.filter(move |contact| {
+    let contacts = host.method.contacts().into_iter().flat_map(|contacts| &contacts.contacts);
+    contacts.filter(move |contact| {
         contact.surfaces().any(|surface| surface.nodes.iter().any(|node| coupled_nodes.contains(node)))
     })
 }
@@ -416,13 +425,15 @@ fn areas(
 ) -> Vec<f64> {
     let mut areas = vec![0.0_f64; coupled_nodes.len()];
     for contact in surfaces(host, coupled_nodes) {
-        let mut own = vec![0.0; coupled_nodes.len()];
+        let mut of_contact = vec![0.0; coupled_nodes.len()];
         for surface in
-            contact.surfaces().filter(|own| own.nodes.iter().all(|node| coupled_nodes.contains(node)))
+            contact.surfaces().filter(|surface| surface.nodes.iter().all(|node| coupled_nodes.contains(node)))
         {
-            add_areas(surface, &place, |node, area| own[(node - coupled_nodes.start) as usize] += area);
+            add_areas(surface, &place, |node, area| {
+                of_contact[(node - coupled_nodes.start) as usize] += area
+            });
         }
-        areas.iter_mut().zip(own).for_each(|(area, own)| *area = area.max(own));
+        areas.iter_mut().zip(of_contact).for_each(|(area, found)| *area = area.max(found));
     }
     areas
 }
@@ -431,8 +442,9 @@ fn areas(
 fn mass_per_area(host: &ParticipantSetup, coupled_nodes: &Range<u32>) -> f64 {
     let (mut mass, mut area) = (0.0, 0.0);
     for contact in surfaces(host, coupled_nodes) {
-        for surface in
-            contact.surfaces().filter(|own| own.nodes.iter().all(|node| !coupled_nodes.contains(node)))
+        for surface in contact
+            .surfaces()
+            .filter(|surface| surface.nodes.iter().all(|node| !coupled_nodes.contains(node)))
         {
             mass += surface.nodes.iter().map(|&node| host.model.inertia(node as usize)).sum::<f64>();
             add_areas(surface, |node| host.model.rest[node as usize], |_, third| area += third);

@@ -193,9 +193,10 @@ impl Springs {
                 false => 0.5 * allowed(&point.slow).min(allowed(&point.fast)),
             };
             point.spring = SPRING * point.dashpot / parts[point.slow.part].steps.step;
-            let own = if point.solved { point.dashpot / parts[point.fast.part].steps.step } else { 0.0 };
+            let from_dashpot =
+                if point.solved { point.dashpot / parts[point.fast.part].steps.step } else { 0.0 };
             point.slow.grip.stiffness = point.spring;
-            point.fast.grip.stiffness = point.spring + own;
+            point.fast.grip.stiffness = point.spring + from_dashpot;
         }
         let memory = match memory.points.is_empty() {
             true => TieMemory { points: vec![[[0.0; 3]; 3]; points.len()], widest: vec![0.0; ties.len()] },
@@ -239,9 +240,9 @@ impl Springs {
 
     /// Lets a participant feel in its next step what those with shorter steps have felt since its last one.
     pub(crate) fn settle(&mut self, part: usize, parts: &[ParticipantSetup]) {
-        let own =
+        let of_part =
             self.points.iter().zip(&mut self.memory.points).filter(|(point, _)| point.slow.part == part);
-        for (_, [on_slow, _, owed]) in own {
+        for (_, [on_slow, _, owed]) in of_part {
             *on_slow = scale(std::mem::take(owed), 1.0 / parts[part].steps.step);
         }
     }
@@ -284,9 +285,9 @@ impl Springs {
         }
         let mut first = 0;
         for (tie, widest) in self.ties.iter().zip(&mut self.memory.widest) {
-            let own = &self.points[first..first + tie.points[0].len()];
-            first += own.len();
-            *widest = own.iter().map(Point::width).fold(*widest, f64::max);
+            let points = &self.points[first..first + tie.points[0].len()];
+            first += points.len();
+            *widest = points.iter().map(Point::width).fold(*widest, f64::max);
         }
     }
 
@@ -300,11 +301,11 @@ impl Springs {
     pub(crate) fn now(&self) -> impl Iterator<Item = TieNow<'_>> {
         let mut first = 0;
         self.ties.iter().zip(&self.memory.widest).map(move |(tie, &widest)| {
-            let own = first..first + tie.points[0].len();
-            first = own.end;
-            let points = &self.points[own.clone()];
+            let range = first..first + tie.points[0].len();
+            first = range.end;
+            let points = &self.points[range.clone()];
             let gap = points.iter().map(Point::width).fold(0.0, f64::max);
-            let of = points.iter().zip(&self.memory.points[own]);
+            let of = points.iter().zip(&self.memory.points[range]);
             let forces = of.fold([[0.0; 3]; 2], |[a, b], (point, &[on_slow, on_fast, _])| {
                 let [first, second] = if point.turned { [on_fast, on_slow] } else { [on_slow, on_fast] };
                 [add(a, first), add(b, second)]
@@ -355,16 +356,16 @@ impl PenaltyTie {
             "both participants are implicit, and a spring between them would be soft: put their bodies into one".into(),
         ));
         }
-        if let Some(own) = solves.iter().position(|&solves| solves) {
-            if both[own].steps.number < both[1 - own].steps.number {
+        if let Some(solving) = solves.iter().position(|&solves| solves) {
+            if both[solving].steps.number < both[1 - solving].steps.number {
                 return Err(refused(format!(
                     "participant `{}` is implicit with longer steps than `{}`, and the tie would be soft: give it a `step` of at most {:e} s",
-                    both[own].name,
-                    both[1 - own].name,
-                    both[1 - own].steps.step
+                    both[solving].name,
+                    both[1 - solving].name,
+                    both[1 - solving].steps.step
                 )));
             }
-            return Ok(1 - own);
+            return Ok(1 - solving);
         }
         Ok(usize::from(both[1].steps.number < both[0].steps.number))
     }

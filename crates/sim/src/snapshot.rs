@@ -64,7 +64,7 @@ impl Snapshot {
             Self::Single(state, _) => state.drive(rigid, leg),
             Self::Double(state, _) => state.drive(rigid, leg),
             Self::Implicit(state) => {
-                state.legs.retain(|(own, _)| *own as usize != rigid);
+                state.legs.retain(|(known, _)| *known as usize != rigid);
                 state.legs.push((rigid as u32, leg));
             }
         }
@@ -152,7 +152,7 @@ impl ContactState {
         let known = |node: u32| (node as usize) < nodes;
         self.forces.len() == 6 * nodes
             && self.touches.is_sorted_by(|a, b| a.node < b.node)
-            && self.touches.iter().all(|own| known(own.node) && own.slip.is_finite())
+            && self.touches.iter().all(|touched| known(touched.node) && touched.slip.is_finite())
             && self.pairs.iter().flatten().all(|&node| known(node))
             && self.lags.iter().map(Lag::number).eq(limited.map(|(number, _)| number))
             && self.lags.iter().all(Lag::is_finite)

@@ -266,9 +266,9 @@ impl<R: Scalar> Solver<R> for LoadSteps<R> {
     ) -> Result<(), Failure> {
         let number = self.steps.number_from(state.time);
         let (of, tolerance) = (self.steps.number, self.tolerance);
-        let mut told = |iteration: Iteration| watch(LoadStepProgress { number, of, iteration, tolerance });
+        let mut report = |iteration: Iteration| watch(LoadStepProgress { number, of, iteration, tolerance });
         self.relaxation
-            .solve_watched(state, self.steps.end_of(number), &mut told)
+            .solve_watched(state, self.steps.end_of(number), &mut report)
             .map(|_| ())
             .map_err(|error| Failure::load_step(&error, number, of))
     }

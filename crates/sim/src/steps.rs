@@ -35,8 +35,8 @@ impl Steps {
 
     /// The end [s] of the step of a number, counted from 1.
     pub fn end_of(&self, number: u64) -> f64 {
-        let own = self.ends.as_ref().and_then(|ends| ends.get(number as usize - 1));
-        own.copied().unwrap_or(number as f64 * self.step)
+        let given_end = self.ends.as_ref().and_then(|ends| ends.get(number as usize - 1));
+        given_end.copied().unwrap_or(number as f64 * self.step)
     }
 
     /// The number, counted from 1, of the step that begins at a time [s].

@@ -155,7 +155,8 @@ impl Simulation {
         }
         arrival.ok_or_else(|| {
             let rigids = setup.parts.iter().filter_map(|part| part.method.contacts());
-            let mut known: Vec<&str> = rigids.flat_map(|all| &all.rigids).map(Rigid::tool).collect();
+            let mut known: Vec<&str> =
+                rigids.flat_map(|contacts| &contacts.rigids).map(Rigid::tool).collect();
             known.dedup();
             Failure::input(&match known.is_empty() {
                 true => format!("there is no tool `{tool}`: no body touches a tool"),
@@ -178,19 +179,21 @@ impl Simulation {
     pub fn tool(&self, name: &str) -> Option<ToolNow> {
         let mut found: Option<ToolNow> = None;
         for (part, now) in self.setup().parts.iter().zip(self.instants()) {
-            let Some(all) = part.method.contacts() else { continue };
-            let own = |number: usize| [all.rigids[number].tool(), &all.rigids[number].name].contains(&name);
-            let Some(number) = (0..all.rigids.len()).find(|&number| own(number)) else { continue };
-            let rigid = &all.rigids[number];
+            let Some(contacts) = part.method.contacts() else { continue };
+            let is_named = |number: usize| {
+                [contacts.rigids[number].tool(), &contacts.rigids[number].name].contains(&name)
+            };
+            let Some(number) = (0..contacts.rigids.len()).find(|&number| is_named(number)) else { continue };
+            let rigid = &contacts.rigids[number];
             let (of_tool, opening) = now.posture(number, rigid);
             let pose = if rigid.tool() == name { of_tool } else { now.pose(number, rigid) };
             let sum = found.get_or_insert(ToolNow { pose, opening, force: [0.0; 3], torque: Some([0.0; 3]) });
             let moments = now.contact_moments();
             let frame = pose.translation.vector.into();
-            for (index, (contact, force)) in all.contacts.iter().zip(now.contact_forces()).enumerate() {
-                if matches!(contact.with, With::Rigid(rigid) if own(rigid)) {
+            for (index, (contact, force)) in contacts.contacts.iter().zip(now.contact_forces()).enumerate() {
+                if matches!(contact.with, With::Rigid(rigid) if is_named(rigid)) {
                     sum.force = add(sum.force, force);
-                    let moment = moments.as_ref().and_then(|all| all.get(index));
+                    let moment = moments.as_ref().and_then(|moments| moments.get(index));
                     let about = |moment: &[f64; 3]| sub(*moment, cross(frame, force));
                     sum.torque = sum.torque.zip(moment).map(|(sum, moment)| add(sum, about(moment)));
                 }

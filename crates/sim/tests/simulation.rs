@@ -124,8 +124,12 @@ fn a_state_can_be_taken_at_a_look_in_every_method() {
         let mut looks = 0;
         while simulation.time() + 0.5 * simulation.step_length() < DURATION {
             let seen = |frame: pliant_sim::Frame<'_>| {
-                let reactions: Vec<_> =
-                    part.model.constraints.iter().map(|own| frame.reaction(&own.name)).collect();
+                let reactions: Vec<_> = part
+                    .model
+                    .constraints
+                    .iter()
+                    .map(|constraint| frame.reaction(&constraint.name))
+                    .collect();
                 let stability: Vec<_> = frame.parts().map(|(_, now)| now.stability()).collect();
                 format!("{:?} {reactions:?} {stability:?}", frame.energies())
             };

@@ -88,8 +88,8 @@ fn free_bodies_keep_their_momentum_at_steps_of_their_own() {
         let steps: Vec<u64> = simulation.setup().parts.iter().map(|part| part.steps.number).collect();
         let first = momentum(&mut simulation);
         let energy = |simulation: &mut Simulation| {
-            let all = simulation.frame().unwrap().energies();
-            all.kinetic + all.internal
+            let energies = simulation.frame().unwrap().energies();
+            energies.kinetic + energies.internal
         };
         let most = energy(&mut simulation);
         let (mut off, mut highest) = (0.0_f64, 0.0_f64);

@@ -39,7 +39,7 @@ pub(super) fn failure(
     let place = body.as_ref().map(|name| format!(" in `{name}`")).unwrap_or_default();
     let of_body =
         |cell| bodies.cell(cell).filter(|(owner, _)| body.as_ref() == Some(&model.bodies[*owner].name));
-    let told = numbered(error, own_node, |cell| of_body(cell).map(|(_, cell)| cell));
+    let renumbered = numbered(error, own_node, |cell| of_body(cell).map(|(_, cell)| cell));
     let slack = node.or_else(|| Some(bodies.model.facets.get(error.broken()?.0)?.nodes[0]));
     let hint = match slack.is_some_and(|node| bodies.is_slack(node)) {
         true => {
@@ -48,8 +48,10 @@ pub(super) fn failure(
         }
         false => "",
     };
-    let message =
-        format!("after t = {} s{place}: {told}{hint}; what was written before stays readable", number(time));
+    let message = format!(
+        "after t = {} s{place}: {renumbered}{hint}; what was written before stays readable",
+        number(time)
+    );
     let element = cell.map(|(_, cell)| cell);
     let blocked = match error {
         SolveError::Blocked { driver: Some((driver, force)), part, gap, .. } => {
@@ -67,20 +69,20 @@ pub(super) fn numbered(
     own_node: Option<u32>,
     own_cell: impl Fn(usize) -> Option<u32>,
 ) -> SolveError {
-    let mut own = error.clone();
+    let mut renumbered = error.clone();
     if let SolveError::NotConverged { node, .. }
     | SolveError::Singular { node, .. }
     | SolveError::Uphill { node, .. }
-    | SolveError::FreeBody { node, .. } = &mut own
+    | SolveError::FreeBody { node, .. } = &mut renumbered
     {
         *node = own_node.unwrap_or(*node);
     }
-    match &mut own {
+    match &mut renumbered {
         SolveError::Broken { cell, .. } => *cell = own_cell(*cell).map_or(*cell, |cell| cell as usize),
         SolveError::NotConverged { broken, .. } => {
             *broken = broken.and_then(|(cell, why)| Some((own_cell(cell)? as usize, why)));
         }
         _ => {}
     }
-    own
+    renumbered
 }

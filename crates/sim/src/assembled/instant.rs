@@ -63,27 +63,27 @@ impl Instant for Assembled {
         };
         let numbers = contact.contacts.nodes();
         let touch = |node: u32| {
-            let found = now.nodes.binary_search_by_key(&node, |own| own.node);
+            let found = now.nodes.binary_search_by_key(&node, |touched| touched.node);
             found.ok().map(|at| &now.nodes[at])
         };
         let pushes: Vec<Vector3<f64>> = numbers
             .iter()
-            .map(|&node| touch(node).map_or_else(Vector3::zeros, |own| own.push.into()))
+            .map(|&node| touch(node).map_or_else(Vector3::zeros, |touched| touched.push.into()))
             .collect();
         let places: Vec<Vector3<f64>> =
             numbers.iter().map(|&node| self.state.position[node as usize]).collect();
         let pressures = pressures(&faces(&contact.contacts, &numbers), &pushes, &places);
-        let own = |(node, pressure): (u32, Option<f64>)| {
-            let (at, own) = (6 * node as usize, touch(node));
+        let node_contact = |(node, pressure): (u32, Option<f64>)| {
+            let (at, touched) = (6 * node as usize, touch(node));
             NodeContact {
                 node,
                 force: [0, 1, 2].map(|c| now.forces[at + c]),
                 pressure,
-                gap: own.map(|own| own.gap),
-                slip: own.map(|own| own.slip),
+                gap: touched.map(|touched| touched.gap),
+                slip: touched.map(|touched| touched.slip),
             }
         };
-        numbers.into_iter().zip(pressures).map(own).collect()
+        numbers.into_iter().zip(pressures).map(node_contact).collect()
     }
 
     fn leg(&self, rigid: usize) -> Option<&Leg> {

@@ -55,13 +55,13 @@ impl SolverMethod {
         equations: impl FnOnce(&mut dyn AssemblySolver),
     ) {
         match self {
-            Self::Static(solver, own) => {
+            Self::Static(solver, model_forces) => {
                 equations(&mut **solver);
-                forces(own);
+                forces(model_forces);
             }
-            Self::Implicit(solver, own) => {
+            Self::Implicit(solver, model_forces) => {
                 equations(&mut **solver);
-                forces(own);
+                forces(model_forces);
             }
             Self::Explicit(solver) => forces(solver.forces_mut()),
         }

@@ -98,15 +98,15 @@ impl Assembled {
     /// # Errors
     /// If its solver can't be made.
     pub(crate) fn new(part: &ParticipantSetup, bodies: &Arc<ImplicitBodies>) -> Result<Self, Failure> {
-        let (model, own) = (&bodies.model, &part.model);
+        let (model, part_model) = (&bodies.model, &part.model);
         let forces = || Forces::new(model.clone());
         let method = match &part.method {
             participant_setup::Method::Static(_, settings) => Statics::new(model.clone(), *settings)
                 .map(|solver| SolverMethod::Static(Box::new(solver), forces())),
-            participant_setup::Method::Implicit(_, own) => {
-                let settings = DynamicSettings { step: part.steps.step, ..own.settings };
+            participant_setup::Method::Implicit(_, dynamics) => {
+                let settings = DynamicSettings { step: part.steps.step, ..dynamics.settings };
                 #[cfg(feature = "gpu")]
-                let device = own.device.clone().map(|device| Arc::new(device) as Arc<dyn LinearDevice>);
+                let device = dynamics.device.clone().map(|device| Arc::new(device) as Arc<dyn LinearDevice>);
                 #[cfg(not(feature = "gpu"))]
                 let device = None;
                 BackwardEuler::on(device, model.clone(), settings)
@@ -138,7 +138,7 @@ impl Assembled {
             _ => None,
         };
         Ok(Self {
-            method: method.map_err(|error| failure(&error, own, bodies, 0.0))?,
+            method: method.map_err(|error| failure(&error, part_model, bodies, 0.0))?,
             steps: part.steps.clone(),
             time: bodies.start.time,
             done: 0,
@@ -146,11 +146,11 @@ impl Assembled {
             outside: vec![0.0; prescribed.len()],
             prescribed,
             // Contradictions were reported when the model was built.
-            owners: own.constrained_components().unwrap_or_default(),
+            owners: part_model.constrained_components().unwrap_or_default(),
             before: None,
             energies: Energies::default(),
-            reactions: vec![[0.0; 3]; own.constraints.len()],
-            enclosed: vec![None; own.constraints.len()],
+            reactions: vec![[0.0; 3]; part_model.constraints.len()],
+            enclosed: vec![None; part_model.constraints.len()],
             evaluated: false,
             entered: false,
             effort: Effort::default(),
@@ -160,10 +160,10 @@ impl Assembled {
             grips: Vec::new(),
             springs: Vec::new(),
             contact: None,
-            solids: (!own.solids.is_empty()).then(|| pliant_explicit::State::at_rest(own)),
+            solids: (!part_model.solids.is_empty()).then(|| pliant_explicit::State::at_rest(part_model)),
             #[cfg(feature = "gpu")]
             device,
-            model: Arc::clone(own),
+            model: Arc::clone(part_model),
             bodies: Arc::clone(bodies),
         })
     }
@@ -186,22 +186,22 @@ impl Assembled {
     /// Finds the forces from outside: loads on free components, what holds or moves the others.
     fn find_outside(&mut self) {
         let forces = self.method.forces();
-        let all = forces.loads().iter().zip(forces.internal()).zip(&self.prescribed);
-        for (own, ((load, internal), held)) in self.outside.iter_mut().zip(all) {
-            *own = if *held { *internal } else { *load };
+        let components = forces.loads().iter().zip(forces.internal()).zip(&self.prescribed);
+        for (outside, ((load, internal), held)) in self.outside.iter_mut().zip(components) {
+            *outside = if *held { *internal } else { *load };
         }
         for constraint in &self.model.constraints {
             let Motion::Mean { weights, .. } = &constraint.motion else { continue };
             let force = constraint.mean_force(|node| forces.resisting(node));
             for (&node, weight) in constraint.nodes.iter().zip(weights) {
-                let own = self.outside[6 * node as usize..].iter_mut().zip(force);
-                own.for_each(|(outside, force)| *outside += weight * force);
+                let at_node = self.outside[6 * node as usize..].iter_mut().zip(force);
+                at_node.for_each(|(outside, force)| *outside += weight * force);
             }
         }
         for (index, enclosed) in self.enclosed.iter_mut().enumerate() {
-            let Some((own, pressed)) = forces.enclosed(index, &self.state) else { continue };
+            let Some((measured, pressed)) = forces.enclosed(index, &self.state) else { continue };
             pressed.into_iter().for_each(|(component, force)| self.outside[component] += force);
-            *enclosed = Some(own);
+            *enclosed = Some(measured);
         }
     }
 
@@ -378,9 +378,9 @@ impl Assembled {
 }
 
 /// Keeps iterations, and of all the last ones.
-fn keep(all: &mut VecDeque<Iterated>, more: impl Iterator<Item = Iterated>) {
-    all.extend(more);
-    all.drain(..all.len().saturating_sub(ITERATIONS_KEPT));
+fn keep(kept: &mut VecDeque<Iterated>, more: impl Iterator<Item = Iterated>) {
+    kept.extend(more);
+    kept.drain(..kept.len().saturating_sub(ITERATIONS_KEPT));
 }
 
 impl Effort {
@@ -439,13 +439,13 @@ impl Assembled {
         self.energies = energies;
         (self.effort, self.effort_before) = (effort.clone(), effort);
         (self.evaluated, self.entered) = (false, entered);
-        if let Some(own) = self.method.contact_mut() {
-            *own.legs_mut() = legs.into_iter().collect();
+        if let Some(system) = self.method.contact_mut() {
+            *system.legs_mut() = legs.into_iter().collect();
         }
         if let Some(ContactState { forces, totals, moments, energy, touches, pairs, lags }) = contact {
-            let gap = touches.iter().map(|own| own.gap).reduce(f64::min);
-            if let Some(own) = self.method.contact_mut() {
-                own.go_on_from(touches.clone(), lags);
+            let gap = touches.iter().map(|touched| touched.gap).reduce(f64::min);
+            if let Some(system) = self.method.contact_mut() {
+                system.go_on_from(touches.clone(), lags);
             }
             self.contact = Some(ContactNow { forces, totals, moments, energy, gap, nodes: touches });
             let taken = self.method.equations_mut().map_or(Ok(()), |solver| solver.take_contact_pairs(pairs));
@@ -471,17 +471,17 @@ impl Assembled {
             energies: self.energies,
             effort: self.effort.clone(),
             convergence: VecDeque::new(),
-            contact: self.contact.as_ref().zip(self.method.contact()).map(|(now, own)| ContactState {
+            contact: self.contact.as_ref().zip(self.method.contact()).map(|(now, system)| ContactState {
                 forces: now.forces.clone(),
                 totals: now.totals.clone(),
                 moments: now.moments.clone(),
                 energy: now.energy,
                 touches: now.nodes.clone(),
-                pairs: own.pairs().to_vec(),
-                lags: own.lags().to_vec(),
+                pairs: system.pairs().to_vec(),
+                lags: system.lags().to_vec(),
             }),
             legs: (self.method.contact().into_iter())
-                .flat_map(|own| own.legs().iter().map(|(&rigid, &leg)| (rigid, leg)))
+                .flat_map(|system| system.legs().iter().map(|(&rigid, &leg)| (rigid, leg)))
                 .collect(),
             path: Path {
                 direction: match &self.method {

@@ -20,7 +20,7 @@ impl Participant for Assembled {
         }
         self.put_springs();
         if self.contact.is_none() {
-            self.contact = self.method.contact_mut().map(|own| own.at(&self.state));
+            self.contact = self.method.contact_mut().map(|system| system.at(&self.state));
         }
         if let (Some(now), SolverMethod::Static(_, forces) | SolverMethod::Implicit(_, forces)) =
             (&self.contact, &mut self.method)
@@ -33,17 +33,17 @@ impl Participant for Assembled {
         self.find_reactions();
         if let Some(solids) = &mut self.solids {
             let places = self.bodies.model.places();
-            for (own, (now, rest)) in
+            for (displacement, (now, rest)) in
                 solids.displacement.iter_mut().zip(self.state.position.iter().zip(places))
             {
-                *own = (now - rest).into();
+                *displacement = (now - rest).into();
             }
-            for ((own, solid), tensors) in
+            for ((history, solid), tensors) in
                 solids.history.iter_mut().zip(&self.model.solids).zip(&self.state.history.tensors)
             {
                 let slots = tensors.len() / solid.cells.len();
                 for (cell, tensors) in tensors.chunks_exact(slots.max(1)).enumerate() {
-                    own.set_cell(cell, tensors);
+                    history.set_cell(cell, tensors);
                 }
             }
         }
@@ -86,8 +86,8 @@ impl Participant for Assembled {
     }
 
     fn drive(&mut self, rigid: usize, leg: Leg) {
-        if let Some(own) = self.method.contact_mut() {
-            own.legs_mut().insert(rigid as u32, leg);
+        if let Some(system) = self.method.contact_mut() {
+            system.legs_mut().insert(rigid as u32, leg);
         }
     }
 

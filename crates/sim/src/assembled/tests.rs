@@ -62,10 +62,10 @@ fn a_facet_at_the_edge_of_folding_over_goes_on_or_fails_on_a_device_as_on_the_pr
             shells.state.rotation[node] = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), angle);
             shells.state.spin[node] = Vector3::x() * (turn / shells.steps.step);
         }
-        let stops = shells.device.as_mut().is_some_and(|own| {
-            own.stepper.upload(&shells.state);
-            let moved = own.stepper.advance(&mut shells.state.clone(), 1).unwrap();
-            own.stepper.upload(&shells.state);
+        let stops = shells.device.as_mut().is_some_and(|on_device| {
+            on_device.stepper.upload(&shells.state);
+            let moved = on_device.stepper.advance(&mut shells.state.clone(), 1).unwrap();
+            on_device.stepper.upload(&shells.state);
             moved.broken
         });
         let stride = shells.stride().min(20);
@@ -76,15 +76,15 @@ fn a_facet_at_the_edge_of_folding_over_goes_on_or_fails_on_a_device_as_on_the_pr
             }
             shells.evaluate(Wanted::Energies)
         };
-        let told = go().map_err(|failure| (failure.kind, failure.element, failure.time, failure.message));
-        (told, shells.state, stops)
+        let outcome = go().map_err(|failure| (failure.kind, failure.element, failure.time, failure.message));
+        (outcome, shells.state, stops)
     };
     let mut stopped = 0;
     for short in [1e-9, 3e-8, 6e-8, 1.2e-7] {
         for turn in [0.0, 0.1] {
             let (expected, exact, _) = run(None, 2.0 - short, turn);
-            let (told, state, stops) = run(Some(&device), 2.0 - short, turn);
-            assert_eq!((&told, told.is_ok()), (&expected, turn == 0.0), "2 − {short:e}");
+            let (outcome, state, stops) = run(Some(&device), 2.0 - short, turn);
+            assert_eq!((&outcome, outcome.is_ok()), (&expected, turn == 0.0), "2 − {short:e}");
             let off = state.rotation.iter().zip(&exact.rotation).map(|(a, b)| a.angle_to(b));
             let off = off.fold(0.0, f64::max);
             assert!(off < 1e-5, "2 − {short:e}: {off:e}");

@@ -105,8 +105,8 @@ impl Simulation {
         state.check(&setup)?;
         let SimulationState(state, between) = state;
         let mut participants = Vec::new();
-        for (part, own) in setup.parts.iter().zip(state) {
-            participants.push(resume(part, own)?);
+        for (part, remembered) in setup.parts.iter().zip(state) {
+            participants.push(resume(part, remembered)?);
         }
         Self::of(setup, participants, between)
     }
@@ -127,13 +127,13 @@ impl Simulation {
             return Ok(None);
         }
         let mut participants = Vec::new();
-        for ((part, own), before) in setup.parts.iter().zip(state).zip(&before.parts) {
+        for ((part, remembered), before) in setup.parts.iter().zip(state).zip(&before.parts) {
             if !same_mesh(before, part) {
                 return Ok(None);
             }
             let model = Some(&*before.model);
-            let steps = own.steps().map(|(clock, step)| Before { clock, step, model });
-            match go_on(part, own.snapshot, steps)? {
+            let steps = remembered.steps().map(|(clock, step)| Before { clock, step, model });
+            match go_on(part, remembered.snapshot, steps)? {
                 Some(participant) => participants.push(participant),
                 None => return Ok(None),
             }
@@ -349,7 +349,7 @@ impl Simulation {
     /// True if a flag may end steps before their end.
     fn can_stop_within(&self) -> bool {
         // States on a device would be read back before each common step.
-        let in_memory = self.participants.iter().all(|own| own.stride() == 1);
+        let in_memory = self.participants.iter().all(|participant| participant.stride() == 1);
         let takes_long =
             |(part, ratio): (&ParticipantSetup, &u64)| part.method.takes_long() || (*ratio > 1 && in_memory);
         self.stop.is_some() && self.setup.parts.iter().zip(&self.ratios).any(takes_long)
@@ -428,7 +428,8 @@ impl Simulation {
             self.done.fill(0);
             let before = std::mem::take(&mut self.before);
             // Forces of a host were found with coupled nodes where they were expected.
-            let back = self.put_back(&before, |own, part| pass > 0 || own.meetings.is_host(part));
+            let back =
+                self.put_back(&before, |simulation, part| pass > 0 || simulation.meetings.is_host(part));
             self.before = before;
             back?;
             while let Some(part) = self.hindmost() {
@@ -454,8 +455,8 @@ impl Simulation {
         let left = self.order.iter().copied().filter(|&part| self.done[part] < self.ratios[part]);
         left.min_by_key(|&part| {
             // In parts of the common step; the first one of several.
-            let all: u64 = 1 << 40;
-            self.done[part] * all / self.ratios[part]
+            let whole: u64 = 1 << 40;
+            self.done[part] * whole / self.ratios[part]
         })
     }
 
@@ -504,7 +505,11 @@ impl Simulation {
     /// If a device fails.
     pub fn state(&mut self) -> Result<SimulationState, Failure> {
         let mut state = self.motion()?;
-        state.0.iter_mut().zip(&self.participants).for_each(|(own, now)| now.add_log(&mut own.snapshot));
+        state
+            .0
+            .iter_mut()
+            .zip(&self.participants)
+            .for_each(|(remembered, now)| now.add_log(&mut remembered.snapshot));
         Ok(state)
     }
 
@@ -518,11 +523,11 @@ impl Simulation {
     /// this is the state last read back.
     pub fn snapshot(&self) -> SimulationState {
         let parts = self.setup.parts.iter().zip(&self.participants).enumerate();
-        let own = parts.map(|(index, (part, now))| {
+        let states = parts.map(|(index, (part, now))| {
             let snapshot = self.met().map_or_else(|| now.snapshot(), |met| met[index].snapshot.clone());
             OwnState { clock: now.clock(), snapshot, step: part.steps.step }
         });
-        SimulationState(own.collect(), self.between())
+        SimulationState(states.collect(), self.between())
     }
 
     /// The states at the instant before its forces were found, where participants touch each other and forces
@@ -566,7 +571,7 @@ impl Simulation {
     pub fn fingerprint(&self) -> u64 {
         match &self.participants[..] {
             [only] => only.fingerprint(),
-            all => fingerprint(&all.iter().map(|one| one.fingerprint()).collect::<Vec<_>>()),
+            several => fingerprint(&several.iter().map(|one| one.fingerprint()).collect::<Vec<_>>()),
         }
     }
 }
@@ -596,15 +601,15 @@ impl Simulation {
     pub fn grip(&mut self, grips: &[Grip]) -> bool {
         let mut of_parts = vec![Vec::new(); self.participants.len()];
         for grip in grips {
-            let Some((part, own)) = self.own(grip) else { return false };
-            of_parts[part].push(own);
+            let Some((part, local)) = self.local_grip(grip) else { return false };
+            of_parts[part].push(local);
         }
         self.hands = of_parts;
-        let mut all = true;
+        let mut held = true;
         for part in 0..self.participants.len() {
-            all &= self.grip_part(part);
+            held &= self.grip_part(part);
         }
-        all
+        held
     }
 
     /// Pushes nodes with forces [N], one a node, counted over the models of all participants. Only these
@@ -650,22 +655,22 @@ impl Simulation {
 
     /// The stiffness [N/m] up to which a grip leaves steps stable; infinite where steps are stable with any.
     pub fn stiffest(&self, grip: &Grip) -> f64 {
-        self.own(grip).map_or(0.0, |(part, own)| self.participants[part].stiffest(&own))
+        self.local_grip(grip).map_or(0.0, |(part, local)| self.participants[part].stiffest(&local))
     }
 
     /// The point of a grip now [m], and its force on the body [N].
     pub fn pulled(&self, grip: &Grip) -> [[f64; 3]; 2] {
-        let pulled = self.own(grip).map(|(part, own)| self.participants[part].pulled(&own));
+        let pulled = self.local_grip(grip).map(|(part, local)| self.participants[part].pulled(&local));
         pulled.unwrap_or([grip.place, [0.0; 3]])
     }
 
     /// The participant of a grip, and the grip with the numbers of the nodes there; `None` where it holds
     /// nodes of several.
-    fn own(&self, grip: &Grip) -> Option<(usize, Grip)> {
+    fn local_grip(&self, grip: &Grip) -> Option<(usize, Grip)> {
         let (part, _) = self.locate(grip.nodes.first().map_or(0, |&(node, _)| node));
         let nodes = grip.nodes.iter().map(|&(node, weight)| {
-            let (own, node) = self.locate(node);
-            (own == part).then_some((node, weight))
+            let (owner, node) = self.locate(node);
+            (owner == part).then_some((node, weight))
         });
         let nodes: Vec<_> = nodes.collect::<Option<_>>()?;
         Some((part, Grip { nodes: self.setup.parts[part].model.resolved(&nodes), ..grip.clone() }))
@@ -684,15 +689,15 @@ impl Simulation {
 }
 
 /// Makes a participant that continues from a state of its part.
-fn resume(part: &ParticipantSetup, own: OwnState) -> Result<Box<dyn Participant>, Failure> {
-    let steps = own.steps().map(|(clock, step)| Before { clock, step, model: None });
-    go_on(part, own.snapshot, steps)?.ok_or_else(|| Failure::input(&"the state is of another model"))
+fn resume(part: &ParticipantSetup, remembered: OwnState) -> Result<Box<dyn Participant>, Failure> {
+    let steps = remembered.steps().map(|(clock, step)| Before { clock, step, model: None });
+    go_on(part, remembered.snapshot, steps)?.ok_or_else(|| Failure::input(&"the state is of another model"))
 }
 
 /// Keeps displacements of a participant at the addresses where another one of the same meshes had its
 /// displacements.
-fn take_place_of(own: &mut Box<dyn Participant>, before: &mut Box<dyn Participant>) {
-    if let (Some(here), Some(there)) = (own.displacements_mut(), before.displacements_mut()) {
+fn take_place_of(participant: &mut Box<dyn Participant>, before: &mut Box<dyn Participant>) {
+    if let (Some(here), Some(there)) = (participant.displacements_mut(), before.displacements_mut()) {
         here.take_place_of(there);
     }
 }

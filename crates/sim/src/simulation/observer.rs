@@ -122,7 +122,7 @@ impl<'a> Frame<'a> {
         value: impl Fn(&dyn Instant, usize) -> [f64; 3],
     ) -> Option<Vec<[f64; 3]>> {
         let (now, nodes) = self.parts().find_map(|(part, now)| {
-            let found = part.model.bodies.iter().find(|own| own.name == body)?;
+            let found = part.model.bodies.iter().find(|known| known.name == body)?;
             Some((now, found.nodes.clone()))
         })?;
         Some(nodes.map(|node| value(now, node as usize)).collect())
@@ -131,8 +131,9 @@ impl<'a> Frame<'a> {
     /// Force [N] by which a constraint holds or moves its nodes; `None` without one of this name.
     pub fn reaction(&self, constraint: &str) -> Option<[f64; 3]> {
         let forces = self.parts().flat_map(|(part, now)| {
-            let own = part.model.constraints.iter().enumerate().filter(|(_, own)| own.name == constraint);
-            own.map(|(index, _)| now.reaction(index))
+            let found =
+                part.model.constraints.iter().enumerate().filter(|(_, known)| known.name == constraint);
+            found.map(|(index, _)| now.reaction(index))
         });
         forces.reduce(|a, b| [a[0] + b[0], a[1] + b[1], a[2] + b[2]])
     }
@@ -140,7 +141,7 @@ impl<'a> Frame<'a> {
     /// The volume that a constraint of volume encloses, and its pressure; `None` without one of this name.
     pub fn enclosed(&self, constraint: &str) -> Option<Enclosed> {
         self.parts().find_map(|(part, now)| {
-            let index = part.model.constraints.iter().position(|own| own.name == constraint)?;
+            let index = part.model.constraints.iter().position(|known| known.name == constraint)?;
             now.enclosed(index)
         })
     }
@@ -149,7 +150,7 @@ impl<'a> Frame<'a> {
     pub fn contact_force(&self, contact: &str) -> Option<[f64; 3]> {
         self.parts().find_map(|(part, now)| {
             let contacts = &part.method.contacts()?.contacts;
-            let index = contacts.iter().position(|own| own.name == contact)?;
+            let index = contacts.iter().position(|known| known.name == contact)?;
             now.contact_forces().get(index).copied()
         })
     }

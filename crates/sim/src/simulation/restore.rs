@@ -16,7 +16,7 @@ impl Simulation {
     pub fn restore(&mut self, state: SimulationState) -> Result<(), Failure> {
         state.check(&self.setup)?;
         self.go_back(state)?;
-        self.participants.iter_mut().for_each(|own| own.cut_log());
+        self.participants.iter_mut().for_each(|participant| participant.cut_log());
         self.grip(&[]);
         Ok(())
     }
@@ -78,8 +78,8 @@ impl Simulation {
         match Self::continued(setup, state, &self.setup)? {
             Some(other) => {
                 let mut before = std::mem::replace(self, other);
-                for (own, before) in self.participants.iter_mut().zip(&mut before.participants) {
-                    take_place_of(own, before);
+                for (participant, before) in self.participants.iter_mut().zip(&mut before.participants) {
+                    take_place_of(participant, before);
                 }
                 if let Some(flag) = &before.stop {
                     self.stop_on(flag);

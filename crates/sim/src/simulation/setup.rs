@@ -37,7 +37,7 @@ impl Setup {
     /// loads or steps.
     pub fn fingerprint_of_bodies(&self) -> u64 {
         fn of(part: &ParticipantSetup) -> (Vec<(String, u64)>, Vec<&str>) {
-            let things = part.method.contacts().into_iter().flat_map(|all| &all.rigids);
+            let things = part.method.contacts().into_iter().flat_map(|contacts| &contacts.rigids);
             (meshes(&part.model), things.map(|rigid| rigid.name.as_str()).collect())
         }
         fingerprint(&self.parts.iter().map(of).collect::<Vec<_>>())

@@ -59,16 +59,16 @@ impl SimulationState {
         let Self(parts, between) = self;
         let alone = between.is_empty();
         let between = (!alone).then(|| postcard::to_stdvec(between));
-        let of = |own: &OwnState| {
-            let steps = postcard::to_stdvec(&own.steps())?;
-            Ok([steps, own.snapshot.encode()?].concat())
+        let of = |remembered: &OwnState| {
+            let steps = postcard::to_stdvec(&remembered.steps())?;
+            Ok([steps, remembered.snapshot.encode()?].concat())
         };
         parts.iter().map(of).chain(between).collect()
     }
 
     /// Its time [s].
     pub fn time(&self) -> f64 {
-        self.0.first().map_or(0.0, |own| own.snapshot.at().0)
+        self.0.first().map_or(0.0, |remembered| remembered.snapshot.at().0)
     }
 
     /// Halves the steps of all participants of its setup that [cut theirs](Setup::cuts_steps) from here on.
@@ -76,7 +76,7 @@ impl SimulationState {
     /// [three times](pliant_explicit::stability::MOST_HALVINGS).
     pub fn halve_steps(&mut self, setup: &Setup) -> bool {
         let mut cut = self.0.iter_mut().zip(&setup.parts).filter(|(_, part)| part.cuts_steps()).peekable();
-        cut.peek().is_some() && cut.all(|(own, _)| own.snapshot.halve_steps())
+        cut.peek().is_some() && cut.all(|(remembered, _)| remembered.snapshot.halve_steps())
     }
 
     /// Checks that the state belongs to a setup.
@@ -87,7 +87,7 @@ impl SimulationState {
         let Self(parts, between) = self;
         let is_own = parts.len() == setup.parts.len()
             && between.fits(setup)
-            && parts.iter().zip(&setup.parts).all(|(own, part)| own.snapshot.fits(part));
+            && parts.iter().zip(&setup.parts).all(|(remembered, part)| remembered.snapshot.fits(part));
         if is_own { Ok(()) } else { Err(Failure::input(&"the state is of another model")) }
     }
 
