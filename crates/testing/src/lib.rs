@@ -166,9 +166,12 @@ impl PeakMemory {
         let output =
             command.args([name, "--exact", "--include-ignored", "--nocapture"]).env(ALONE, name).output();
         let output = output.unwrap();
-        let [told, failed] = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes));
-        print!("{told}");
-        assert!(output.status.success() && told.contains("1 passed"), "{name} in its own process: {failed}");
+        let [printed, failed] = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes));
+        print!("{printed}");
+        assert!(
+            output.status.success() && printed.contains("1 passed"),
+            "{name} in its own process: {failed}"
+        );
         None
     }
 

@@ -101,9 +101,9 @@ pub fn interface_rms(mesh: &Mesh, label: i32, organ: Organ) -> f64 {
     part.block_mut(CellKind::Tet).nodes =
         (0..block.len()).filter(of_label).flat_map(|at| block.cell(at).to_vec()).collect();
     let phantom = Phantom::new(organ, 1.0).expect("a positive scale");
-    let all = Stuffing::new(0.001);
+    let stuffing = Stuffing::new(0.001);
     // The ventricles do not meet: the fine mesh keeps one ventricle, and only its side of the middle counts.
-    let fine = all.mesh(&phantom).expect("the organ is meshed").mesh;
+    let fine = stuffing.mesh(&phantom).expect("the organ is meshed").mesh;
     let surface = boundary(&fine);
     let faces: Vec<u32> = (0..surface.faces.len() as u32).collect();
     let locator = SurfaceLocator::new(&surface, &faces, &fine.points);

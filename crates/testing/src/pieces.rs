@@ -114,7 +114,7 @@ impl Piece {
                 sides.entry(key).or_insert_with(Vec::new).push(face);
             }
         }
-        let faces = sides.into_values().filter(|own| own.len() == 1).flatten().collect();
+        let faces = sides.into_values().filter(|sharing| sharing.len() == 1).flatten().collect();
         Tets { points, tets, faces, far }
     }
 }
@@ -161,9 +161,9 @@ pub struct Scene {
 /// With the mistakes of all scenes that went wrong.
 pub fn play_all(scenes: &[Scene], play: impl Fn(&Scene, bool) -> Result<(), String>) {
     let held = |scene: &&Scene| scene.pieces.iter().any(|piece| piece.velocity.is_none());
-    let all = scenes.iter().map(|scene| (scene, false));
-    let all = all.chain(scenes.iter().filter(held).map(|scene| (scene, true)));
-    let wrong: Vec<String> = all.filter_map(|(scene, is_rigid)| play(scene, is_rigid).err()).collect();
+    let runs = scenes.iter().map(|scene| (scene, false));
+    let runs = runs.chain(scenes.iter().filter(held).map(|scene| (scene, true)));
+    let wrong: Vec<String> = runs.filter_map(|(scene, is_rigid)| play(scene, is_rigid).err()).collect();
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 

@@ -262,15 +262,15 @@ impl Workshop {
     /// The cells of a CSV file row by row; commas in quotes do not separate cells.
     pub fn cells(&self, name: &str) -> Vec<Vec<String>> {
         let cells = |line: &str| {
-            let (mut all, mut quoted) = (vec![String::new()], false);
+            let (mut cells, mut quoted) = (vec![String::new()], false);
             for c in line.chars() {
                 match c {
                     '"' => quoted = !quoted,
-                    ',' if !quoted => all.push(String::new()),
-                    c => all.last_mut().expect("a cell").push(c),
+                    ',' if !quoted => cells.push(String::new()),
+                    c => cells.last_mut().expect("a cell").push(c),
                 }
             }
-            all
+            cells
         };
         self.read(name).lines().map(cells).collect()
     }
@@ -279,16 +279,16 @@ impl Workshop {
     pub fn checkpoints(&self, folder: &str) -> Vec<PathBuf> {
         let paths =
             fs::read_dir(self.path(folder)).expect("a folder").map(|entry| entry.expect("an entry").path());
-        let mut all: Vec<PathBuf> =
+        let mut checkpoints: Vec<PathBuf> =
             paths.filter(|path| path.extension().is_some_and(|ending| ending == "pliant")).collect();
-        all.sort();
-        all
+        checkpoints.sort();
+        checkpoints
     }
 
     /// Returns all files in a folder with their contents, except checkpoints and the page with the wall time.
     pub fn files(&self, folder: &str) -> Vec<(PathBuf, Vec<u8>)> {
         let folder = self.path(folder);
-        let (mut all, mut open) = (Vec::new(), vec![folder.clone()]);
+        let (mut files, mut open) = (Vec::new(), vec![folder.clone()]);
         while let Some(next) = open.pop() {
             for entry in fs::read_dir(next).expect("a folder") {
                 let path = entry.expect("an entry").path();
@@ -298,12 +298,12 @@ impl Workshop {
                     open.push(path);
                 } else if !kept {
                     let name = path.strip_prefix(&folder).expect("a path below").to_owned();
-                    all.push((name, fs::read(&path).expect("a file")));
+                    files.push((name, fs::read(&path).expect("a file")));
                 }
             }
         }
-        all.sort();
-        all
+        files.sort();
+        files
     }
 
     /// Panics unless two folders have the same [files](Self::files).
@@ -468,11 +468,11 @@ pub struct Told {
 impl Told {
     /// Adds the texts of mistakes or warnings that are shown.
     fn show(&mut self, errors: &SceneErrors) {
-        let all = errors.diagnostics();
-        if all.len() > 1 {
+        let diagnostics = errors.diagnostics();
+        if diagnostics.len() > 1 {
             self.err += &format!("{errors}\n");
         }
-        for diagnostic in &all[..all.len().min(MOST_SHOWN)] {
+        for diagnostic in &diagnostics[..diagnostics.len().min(MOST_SHOWN)] {
             let Diagnostic { message, span, option, label, help, also, .. } = diagnostic;
             let also_labels = also.iter().map(|(_, label)| label.as_str());
             let pieces = [message.as_str(), label].into_iter().chain(also_labels).chain(help.as_deref());
@@ -521,7 +521,7 @@ impl Told {
 
     /// True if something is underlined in this line of the scene.
     pub fn underlines(&self, line: &str) -> bool {
-        self.underlined.iter().any(|own| own.trim_end() == line)
+        self.underlined.iter().any(|shown| shown.trim_end() == line)
     }
 }
 
