@@ -82,7 +82,7 @@ impl Volumetric {
         deformation.inverse_cauchy_green * self.kirchhoff_pressure(deformation)
     }
 
-    /// A law with this energy in WGSL. `snippets` are the rest of its text, `parameters` those from index 1 on.
+    /// A law with this energy in WGSL. `snippets` are its other text, `parameters` those from index 1 on.
     pub(super) fn shader(&self, snippets: &[&str], parameters: &[f64]) -> Shader {
         let pressure = match self.energy {
             VolumetricEnergy::Quadratic => "j * x",
