@@ -197,8 +197,8 @@ mod tests {
         let mapping = CarriedPoints::Shell(&model, &surface, &carried);
         for (point, force) in forces.iter().enumerate() {
             mapping.add_force(&state, point, (*force).into(), &mut |node, force, moment| {
-                let own = force.into_iter().chain(moment);
-                nodal[6 * node as usize..].iter_mut().zip(own).for_each(|(sum, value)| *sum += value);
+                let components = force.into_iter().chain(moment);
+                nodal[6 * node as usize..].iter_mut().zip(components).for_each(|(sum, value)| *sum += value);
             });
         }
         let part = |at: usize| Vector3::new(nodal[at], nodal[at + 1], nodal[at + 2]);

@@ -113,7 +113,7 @@ impl ShellFields {
             .into_par_iter()
             .with_min_len(64)
             .enumerate()
-            .find_map_first(|(cell, (facet, own, wall, stress, mises))| {
+            .find_map_first(|(cell, (facet, section, wall, stress, mises))| {
                 let (x, rotation) = state.corners(facet.nodes);
                 let placed = match facet.place(&x, &rotation) {
                     Ok(placed) => placed,
@@ -124,10 +124,10 @@ impl ShellFields {
                 let (stresses, largest) = facet.stresses(&resultants);
                 let stresses = stresses.map(|stress| in_space(&stress));
                 let each = stresses.map(|stress| von_mises(&stress));
-                *own.0 = in_space(&resultants.membrane);
-                *own.1 = in_space(&resultants.moment);
-                *own.2 = largest;
-                *own.3 = ShellEnergy {
+                *section.0 = in_space(&resultants.membrane);
+                *section.1 = in_space(&resultants.moment);
+                *section.2 = largest;
+                *section.3 = ShellEnergy {
                     membrane: energy.membrane / facet.area,
                     bending: energy.bending / facet.area,
                     drilling: energy.drilling / facet.area,
@@ -312,8 +312,8 @@ mod tests {
             let off =
                 |cells: &[[f64; 2]]| cells.iter().map(|n| (n[direction] - 1.0).abs()).fold(0.0, f64::max);
             // Two of six rings are away from the ends.
-            let (all, inner) = (off(&ratios), off(&ratios[192..384]));
-            println!("cylinder: mean {mean:.4}, off by {inner:.4}, at the ends {all:.4}");
+            let (whole, inner) = (off(&ratios), off(&ratios[192..384]));
+            println!("cylinder: mean {mean:.4}, off by {inner:.4}, at the ends {whole:.4}");
             assert!((mean - 1.0).abs() < 0.003 && inner < middle, "{mean} {inner}");
         }
     }

@@ -146,8 +146,9 @@ impl Assembly {
     /// The nodes that turn with a solid, without the nodes of rigid parts, which turn with their part.
     pub(crate) fn carried_turns(&self) -> impl Iterator<Item = &CarriedTurn> {
         let rigid = |constraint: &Constraint| matches!(constraint.motion, Motion::Rigid);
-        let bound =
-            move |node: u32| self.constraints.iter().any(|own| rigid(own) && own.nodes.contains(&node));
+        let bound = move |node: u32| {
+            self.constraints.iter().any(|constraint| rigid(constraint) && constraint.nodes.contains(&node))
+        };
         self.turns.iter().filter(move |turn| !bound(turn.node))
     }
 
@@ -303,9 +304,9 @@ impl Assembly {
                 neighbours[cell] = (neighbours[cell].0 + 1, neighbours[cell].1 && back);
             }
         }
-        let mut all = (0..cells.len()).filter(|&cell| neighbours[cell].0 > 1 && neighbours[cell].1);
-        let first = all.next()?;
-        Some((1 + all.count(), first))
+        let mut inverted = (0..cells.len()).filter(|&cell| neighbours[cell].0 > 1 && neighbours[cell].1);
+        let first = inverted.next()?;
+        Some((1 + inverted.count(), first))
     }
 
     /// Adds a solid, which gives mass to its nodes. It may share nodes with shells and other solids.

@@ -129,8 +129,8 @@ fn borders(loops: &[Vec<u32>]) -> String {
         let more = if nodes.len() > 5 { ", …" } else { "" };
         format!("{} nodes ({}{more})", nodes.len(), first.join(", "))
     };
-    let told: Vec<String> = loops.iter().take(3).map(border).collect();
-    told.join("; ") + if loops.len() > 3 { "; …" } else { "" }
+    let descriptions: Vec<String> = loops.iter().take(3).map(border).collect();
+    descriptions.join("; ") + if loops.len() > 3 { "; …" } else { "" }
 }
 
 /// Reason why a solver stopped. The state holds all that was found before.

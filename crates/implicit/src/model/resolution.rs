@@ -66,8 +66,8 @@ impl Assembly {
             for i in 0..3 {
                 let (a, b) = (nodes[i], nodes[(i + 1) % 3]);
                 *edges.entry([a.min(b), a.max(b)]).or_default() += 1;
-                let own = self.corner_normals[cell as usize][i];
-                normal.entry(a).or_insert(self.normals[own as usize].direction);
+                let corner_normal = self.corner_normals[cell as usize][i];
+                normal.entry(a).or_insert(self.normals[corner_normal as usize].direction);
             }
         }
         let mut around: BTreeMap<u32, (Vector3<f64>, f64)> = BTreeMap::new();
@@ -78,8 +78,8 @@ impl Assembly {
             }
             for [a, b] in [ends, [ends[1], ends[0]]] {
                 let edge = self.place(b as usize) - self.place(a as usize);
-                let own = around.entry(a).or_insert((Vector3::zeros(), 0.0));
-                *own = (own.0 + edge, own.1 + edge.norm());
+                let sums = around.entry(a).or_insert((Vector3::zeros(), 0.0));
+                *sums = (sums.0 + edge, sums.1 + edge.norm());
             }
         }
         let uneven = |(node, (sum, length)): (&u32, &(Vector3<f64>, f64))| {

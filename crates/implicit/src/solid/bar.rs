@@ -11,18 +11,18 @@ impl Response {
     /// Adds a bar.
     pub(super) fn add_bar(
         &mut self,
-        own: CellMaterial<'_>,
+        material: CellMaterial<'_>,
         u: &[Vector<f64>; 2],
         rest: &Rest<2>,
         cord: &Cord,
     ) {
-        let pull = cord.pull(rest, sub(u[1], u[0]), own.law.small_strain().young());
+        let pull = cord.pull(rest, sub(u[1], u[0]), material.law.small_strain().young());
         let Pull { along, length, stress: [stress, slope], .. } = pull;
         self.energy += cord.energy(rest, &pull);
         let force = scale(along, stress * rest.area());
         add_to(&mut self.force, 1, force);
         add_to(&mut self.force, 0, scale(force, -1.0));
-        if !own.stiffness || length == 0.0 {
+        if !material.stiffness || length == 0.0 {
             return;
         }
         let stretching = slope * rest.area() / (cord.slack * rest.length());

@@ -27,9 +27,9 @@ pub(super) fn add_point<const N: usize>(
     let s = r.tr_mul(&f);
     let trace = s.trace() - 3.0;
     let stress = 2.0 * mu * (f - r) + lambda * trace * r;
-    for (own, b) in force.chunks_exact_mut(3).zip(shape) {
+    for (of_node, b) in force.chunks_exact_mut(3).zip(shape) {
         let nodal = stress * Vector3::from(*b) * w;
-        own.iter_mut().zip(&nodal).for_each(|(own, by)| *own += by);
+        of_node.iter_mut().zip(&nodal).for_each(|(entry, by)| *entry += by);
     }
     if let Some(k) = tangent {
         let spread = Matrix3::from_diagonal_element(s.trace()) - s;
@@ -43,9 +43,9 @@ pub(super) fn add_point<const N: usize>(
                 let dr = r * skew(&(inverse * axial));
                 let dp = (2.0 * mu * (df - dr) + lambda * (a.trace() * r + trace * dr)) * w;
                 let column = &mut k[(3 * b + c) * 3 * N..][..3 * N];
-                for (own, g) in column.chunks_exact_mut(3).zip(shape) {
+                for (of_node, g) in column.chunks_exact_mut(3).zip(shape) {
                     let nodal = dp * Vector3::from(*g);
-                    own.iter_mut().zip(&nodal).for_each(|(own, by)| *own += by);
+                    of_node.iter_mut().zip(&nodal).for_each(|(entry, by)| *entry += by);
                 }
             }
         }

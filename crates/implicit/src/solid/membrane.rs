@@ -22,10 +22,10 @@ pub(super) fn changes(u: &[Vector<f64>; 3], shape: &[[f64; 2]; 3]) -> [Vector<f6
 }
 
 impl Response {
-    /// Adds a triangle; the fibres of `own` are in its frame.
+    /// Adds a triangle; the fibres of `material` are in its frame.
     pub(super) fn add_triangle(
         &mut self,
-        own: CellMaterial<'_>,
+        material: CellMaterial<'_>,
         u: &[Vector<f64>; 3],
         rest: &Rest<3>,
         axes: &Axes,
@@ -37,14 +37,14 @@ impl Response {
         if area.is_nan() || area < FLAT_WALL {
             return Err(Broken::Inverted(0.0));
         }
-        let found = own.law.plane_stress(plane.strain_twice, own.fibres);
-        let ([factor, _], [remembered, counts, _]) = (own.lag.factors, own.lag.counts);
+        let found = material.law.plane_stress(plane.strain_twice, material.fibres);
+        let ([factor, _], [remembered, counts, _]) = (material.lag.factors, material.lag.counts);
         let w = rest.volume;
         if counts {
             self.energy += w * (factor * found.energy);
         }
         let [mut xx, mut yy, mut xy] = found.stress.map(|stress| factor * stress);
-        if let Some(kept) = own.lag.kept.first() {
+        if let Some(kept) = material.lag.kept.first() {
             let [own_xx, own_yy, _, own_xy, _, _] = kept.0;
             (xx, yy, xy) = (xx + own_xx, yy + own_yy, xy + own_xy);
             if remembered {
@@ -56,16 +56,19 @@ impl Response {
         for (a, &[g, h]) in shape.iter().enumerate() {
             add_to(&mut self.force, a, scale(add(scale(pulled[0], g), scale(pulled[1], h)), w));
         }
-        if !own.stiffness {
+        if !material.stiffness {
             return Ok(());
         }
-        let d = own.law.plane_tangent(plane.strain_twice, own.fibres).map(|row| row.map(|d| factor * d));
+        let d = material
+            .law
+            .plane_tangent(plane.strain_twice, material.fibres)
+            .map(|row| row.map(|d| factor * d));
         // Of each node its three columns of 𝔹: the changes of E₁₁, E₂₂ and 2E₁₂ with its place.
         let strains = shape.map(|[g, h]| [0, 1, 2].map(|c| [t[c] * g, s[c] * h, t[c] * h + s[c] * g]));
-        for (b, own) in strains.iter().enumerate() {
+        for (b, columns) in strains.iter().enumerate() {
             let [g, h] = shape[b];
             let stressed = [xx * g + xy * h, xy * g + yy * h];
-            for (k, column) in own.iter().enumerate() {
+            for (k, column) in columns.iter().enumerate() {
                 let pushed = d.map(|row| w * (row[0] * column[0] + row[1] * column[1] + row[2] * column[2]));
                 let start = (3 * b + k) * 9;
                 for (a, other) in strains.iter().enumerate() {

@@ -74,15 +74,15 @@ impl Response {
             return;
         }
         let fibres = solid.law_fibres(cell);
-        let own = CellMaterial { law: &solid.material.law, fibres: &fibres, lag, stiffness };
+        let material = CellMaterial { law: &solid.material.law, fibres: &fibres, lag, stiffness };
         let found = match &solid.cells {
-            Cells::Tet4(block) => self.fill_plain(own, (solid, block), cell, displacement),
-            Cells::Hex8(block) => self.fill_plain(own, (solid, block), cell, displacement),
+            Cells::Tet4(block) => self.fill_plain(material, (solid, block), cell, displacement),
+            Cells::Hex8(block) => self.fill_plain(material, (solid, block), cell, displacement),
             Cells::AveragedTet4(block, _) => {
                 let u = moved(block, cell, displacement);
                 let rest = &block.rest[cell];
                 let part = Part::Shape(pressure.unwrap_or(0.0));
-                self.add_point(own, &u, &rest.gradient, rest.volume, part)
+                self.add_point(material, &u, &rest.gradient, rest.volume, part)
             }
             Cells::FullHex8(block, points) => {
                 let u = moved(block, cell, displacement);
@@ -90,10 +90,10 @@ impl Response {
                 let weighted = || points.gradient.iter().zip(points.weight);
                 let share = |(b, w): (&[Vector<f64>; 8], f64)| w * volume_change(&gradient(&u, b));
                 let change = weighted().map(share).sum::<f64>() / volume;
-                let [pressure, second] = own.law.volume_pressures(change);
-                self.energy += volume * own.law.volume_energy(change);
+                let [pressure, second] = material.law.volume_pressures(change);
+                self.energy += volume * material.law.volume_energy(change);
                 let each = weighted().enumerate().try_for_each(|(point, (b, w))| {
-                    self.add_point(own.at(point), &u, b, w, Part::Shape(pressure))
+                    self.add_point(material.at(point), &u, b, w, Part::Shape(pressure))
                 });
                 if stiffness {
                     let mut changes = [[0.0; 3]; 8];
@@ -106,11 +106,11 @@ impl Response {
             }
             Cells::Membrane(block, sheets) => {
                 let u = moved(block, cell, displacement);
-                self.add_triangle(own, &u, &block.rest[cell], &sheets[cell].axes)
+                self.add_triangle(material, &u, &block.rest[cell], &sheets[cell].axes)
             }
             Cells::Bar(block, cord) => {
                 let u = moved(block, cell, displacement);
-                self.add_bar(own, &u, &block.rest[cell], cord);
+                self.add_bar(material, &u, &block.rest[cell], cord);
                 Ok(())
             }
         };
@@ -120,17 +120,17 @@ impl Response {
     /// One evaluation point, with hourglass control where there is some.
     fn fill_plain<const N: usize>(
         &mut self,
-        own: CellMaterial<'_>,
+        material: CellMaterial<'_>,
         (solid, block): (&Solid, &CellBlock<N>),
         cell: usize,
         displacement: impl Fn(u32) -> Vector<f64>,
     ) -> Result<(), Broken> {
         let u = moved(block, cell, displacement);
         let rest = &block.rest[cell];
-        self.add_point(own, &u, &rest.gradient, rest.volume, Part::Whole)?;
+        self.add_point(material, &u, &rest.gradient, rest.volume, Part::Whole)?;
         if let Some(control) = &block.hourglass {
             let growth = solid.hourglass_growth().map(|shear| (shear, &rest.gradient));
-            self.add_hourglass(own, control, cell, &u, growth);
+            self.add_hourglass(material, control, cell, &u, growth);
         }
         Ok(())
     }
@@ -139,23 +139,23 @@ impl Response {
     /// the gradients of the shape functions [1/m]; without `growth`, g is 1.
     fn add_hourglass<const N: usize>(
         &mut self,
-        own: CellMaterial<'_>,
+        material: CellMaterial<'_>,
         control: &Hourglass<f64, N>,
         cell: usize,
         u: &[Vector<f64>; N],
         growth: Option<(f64, &[Vector<f64>; N])>,
     ) {
-        let all = control.patterns[cell]
+        let amplitudes = control.patterns[cell]
             .map(|pattern| u.iter().zip(pattern).fold([0.0; 3], |q, (&u, gamma)| add(q, scale(u, gamma))));
-        let constant = 0.5 * control.stiffness[cell] * all.iter().map(|&q| dot(q, q)).sum::<f64>();
-        let grown = growth.map(|(shear, shape)| own.growth(&gradient(u, shape), shear));
+        let constant = 0.5 * control.stiffness[cell] * amplitudes.iter().map(|&q| dot(q, q)).sum::<f64>();
+        let grown = growth.map(|(shear, shape)| material.growth(&gradient(u, shape), shear));
         let factor = grown.map_or(1.0, |(factor, _)| factor);
         let k = factor * control.stiffness[cell];
         self.hourglass = factor * constant;
         self.energy += self.hourglass;
         // Σ_c k₀ γ_ca q_c, the gradient of the constant energy.
         let mut resistance = [[0.0; 3]; N];
-        for (pattern, &q) in control.patterns[cell].iter().zip(&all) {
+        for (pattern, &q) in control.patterns[cell].iter().zip(&amplitudes) {
             for (a, &gamma) in pattern.iter().enumerate() {
                 resistance[a] = add(resistance[a], scale(q, gamma * control.stiffness[cell]));
             }
@@ -163,7 +163,7 @@ impl Response {
         for (a, &f) in resistance.iter().enumerate() {
             add_to(&mut self.force, a, scale(f, factor));
         }
-        if own.stiffness {
+        if material.stiffness {
             for pattern in &control.patterns[cell] {
                 for (b, &gb) in pattern.iter().enumerate() {
                     for (a, &ga) in pattern.iter().enumerate() {
@@ -182,9 +182,9 @@ impl Response {
         for (a, &f) in slopes.iter().enumerate() {
             add_to(&mut self.force, a, scale(f, constant));
         }
-        if own.stiffness {
+        if material.stiffness {
             add_symmetric_dyads(&mut self.tangent, resistance.as_flattened(), slopes.as_flattened());
-            let second = own.growth_curvature(&gradient(u, shape), shear);
+            let second = material.growth_curvature(&gradient(u, shape), shear);
             add_second(&mut self.tangent, &second, shape, constant);
         }
     }
@@ -192,7 +192,7 @@ impl Response {
     /// Adds a point of weight `w` [m³] with the gradients `shape` [1/m].
     fn add_point<const N: usize>(
         &mut self,
-        own: CellMaterial<'_>,
+        material: CellMaterial<'_>,
         u: &[Vector<f64>; N],
         shape: &[Vector<f64>; N],
         w: f64,
@@ -203,17 +203,18 @@ impl Response {
         if is_inverted(ratio) {
             return Err(Broken::Inverted(ratio));
         }
-        if let (AnyLaw::Corotational(law), Part::Whole, []) = (own.law, part, own.lag.kept) {
-            let tangent = own.stiffness.then_some(&mut self.tangent[..]);
+        if let (AnyLaw::Corotational(law), Part::Whole, []) = (material.law, part, material.lag.kept) {
+            let tangent = material.stiffness.then_some(&mut self.tangent[..]);
             self.energy += w * closed::add_point(law, &h, shape, w, &mut self.force, tangent)?;
             return Ok(());
         }
         let deformation = Deformation::from_displacement_gradient(&h);
-        let energy = own.law.energy(&deformation, own.fibres);
-        let kept = own.lag.kept.first().copied();
-        let stress =
-            own.taken(own.law.stress(&deformation, own.fibres), part) + kept.unwrap_or(Symmetric::ZERO);
-        let ([shares, volume], [remembered, shape_counts, volume_counts]) = (own.lag.factors, own.lag.counts);
+        let energy = material.law.energy(&deformation, material.fibres);
+        let kept = material.lag.kept.first().copied();
+        let stress = material.taken(material.law.stress(&deformation, material.fibres), part)
+            + kept.unwrap_or(Symmetric::ZERO);
+        let ([shares, volume], [remembered, shape_counts, volume_counts]) =
+            (material.lag.factors, material.lag.counts);
         if shape_counts {
             self.energy += w * (shares * energy.isochoric);
         }
@@ -229,8 +230,8 @@ impl Response {
         for (a, &b) in shape.iter().enumerate() {
             add_to(&mut self.force, a, scale(piola.apply(b), w));
         }
-        if own.stiffness {
-            let tangent = own.law.tangent(&h, own.fibres, |stress| own.taken(stress, part));
+        if material.stiffness {
+            let tangent = material.law.tangent(&h, material.fibres, |stress| material.taken(stress, part));
             add_material(&mut self.tangent, &deformation.gradient, &tangent, &stress, shape, w);
             if let Part::Shape(pressure) = part {
                 add_pressure(&mut self.tangent, &deformation.gradient, shape, w * pressure);
@@ -339,9 +340,9 @@ fn inverted_corner(solid: &Solid, cell: usize, displacement: impl Fn(u32) -> Vec
         }
         Cells::FullHex8(block, points) => {
             let u = moved(block, cell, &displacement);
-            let own = points[cell].gradient.iter().zip(points[cell].weight);
+            let weighted = points[cell].gradient.iter().zip(points[cell].weight);
             let volume = |(b, w): (&[Vector<f64>; 8], f64)| w * (1.0 + volume_change(&gradient(&u, b)));
-            own.map(volume).sum::<f64>() / block.rest[cell].volume
+            weighted.map(volume).sum::<f64>() / block.rest[cell].volume
         }
         Cells::Tet4(_) | Cells::AveragedTet4(..) | Cells::Membrane(..) | Cells::Bar(..) => return None,
     };
@@ -362,7 +363,7 @@ fn moved<const N: usize>(
     displacement: impl Fn(u32) -> Vector<f64>,
 ) -> [Vector<f64>; N] {
     let u = block.nodes[cell].map(displacement);
-    u.map(|own| sub(own, u[0]))
+    u.map(|nodal| sub(nodal, u[0]))
 }
 
 /// Strain of a point.
@@ -441,16 +442,16 @@ fn volume_change(h: &Tensor<f64>) -> f64 {
 }
 
 fn add_to(force: &mut [f64], node: usize, by: Vector<f64>) {
-    for (own, by) in force[3 * node..3 * node + 3].iter_mut().zip(by) {
-        *own += by;
+    for (sum, by) in force[3 * node..3 * node + 3].iter_mut().zip(by) {
+        *sum += by;
     }
 }
 
 /// Adds w cof F B_a, the derivative of w J by each node's place.
 fn add_volume_change(changes: &mut [Vector<f64>], h: &Tensor<f64>, shape: &[Vector<f64>], w: f64) {
     let cofactor = with_identity(h).cofactor();
-    for (own, &b) in changes.iter_mut().zip(shape) {
-        *own = add(*own, scale(cofactor.apply(b), w));
+    for (change, &b) in changes.iter_mut().zip(shape) {
+        *change = add(*change, scale(cofactor.apply(b), w));
     }
 }
 
@@ -482,8 +483,8 @@ fn add_second<const N: usize>(tangent: &mut [f64], second: &[[f64; 9]; 9], shape
         // A B_b of component k.
         let along = second.map(|row| w * dot([row[3 * k], row[3 * k + 1], row[3 * k + 2]], shape[b]));
         for (a, i) in (0..N).flat_map(|a| (0..3).map(move |i| (a, i))) {
-            let own = [along[3 * i], along[3 * i + 1], along[3 * i + 2]];
-            tangent[(3 * b + k) * 3 * N + 3 * a + i] += dot(own, shape[a]);
+            let part = [along[3 * i], along[3 * i + 1], along[3 * i + 2]];
+            tangent[(3 * b + k) * 3 * N + 3 * a + i] += dot(part, shape[a]);
         }
     }
 }
@@ -511,13 +512,13 @@ fn add_material<const N: usize>(
             ]
         })
     };
-    let all: [[[f64; 6]; 3]; N] = std::array::from_fn(|a| strains(&shape[a]));
-    for (b, own) in all.iter().enumerate() {
+    let by_node: [[[f64; 6]; 3]; N] = std::array::from_fn(|a| strains(&shape[a]));
+    for (b, columns) in by_node.iter().enumerate() {
         let pulled = scale(stress.apply(shape[b]), w);
-        for (k, column) in own.iter().enumerate() {
+        for (k, column) in columns.iter().enumerate() {
             let stressed: [f64; 6] = d.map(|row| w * row.iter().zip(column).map(|(d, e)| d * e).sum::<f64>());
             let start = (3 * b + k) * 3 * N;
-            for (a, other) in all.iter().enumerate() {
+            for (a, other) in by_node.iter().enumerate() {
                 for (i, row) in other.iter().enumerate() {
                     tangent[start + 3 * a + i] += row.iter().zip(&stressed).map(|(e, s)| e * s).sum::<f64>();
                 }

@@ -88,9 +88,9 @@ impl StressParts {
     /// leave h unchanged.
     fn set_step(&mut self, Prony { isochoric, volumetric, update }: &Prony, step: Option<f64>) {
         let of_term = |&term: &(f64, f64)| step.map_or((1.0, 0.0), |step| update.coefficients(term, step));
-        for (own, terms) in self.coefficients.iter_mut().zip([isochoric, volumetric]) {
-            own.clear();
-            own.extend(terms.iter().map(of_term));
+        for (coefficients, terms) in self.coefficients.iter_mut().zip([isochoric, volumetric]) {
+            coefficients.clear();
+            coefficients.extend(terms.iter().map(of_term));
         }
     }
 }
@@ -134,28 +134,30 @@ impl Relaxation {
 
     fn take(&mut self, model: &Model, history: &History, step: Option<f64>) {
         self.steps = step.is_some();
-        for ((own, solid), tensors) in self.solids.iter_mut().zip(&model.solids).zip(&history.tensors) {
+        for ((parts, solid), tensors) in self.solids.iter_mut().zip(&model.solids).zip(&history.tensors) {
             let (prony, averages) = (&solid.material.prony, solid.cells.averages_pressure());
-            own.set_step(prony, step);
-            let StressParts { factors, kept: all, coefficients } = own;
+            parts.set_step(prony, step);
+            let StressParts { factors, kept: stresses, coefficients } = parts;
             let [shape, volume] = &*coefficients;
             *factors = [factor(&prony.isochoric, shape), factor(&prony.volumetric, volume)];
-            all.clear();
+            stresses.clear();
             let slots = prony.point_slots(averages);
             if slots > 0 {
-                all.extend(tensors.chunks_exact(slots).map(|point| kept(prony, coefficients, point)));
+                stresses.extend(tensors.chunks_exact(slots).map(|point| kept(prony, coefficients, point)));
             }
         }
     }
 
     /// Relaxation of the stresses of a cell.
     pub(crate) fn of_cell(&self, number: usize, solid: &Solid, cell: usize) -> Lag<'_> {
-        let Some(own) = self.solids.get(number).filter(|own| !own.kept.is_empty()) else { return Lag::NONE };
+        let Some(parts) = self.solids.get(number).filter(|parts| !parts.kept.is_empty()) else {
+            return Lag::NONE;
+        };
         let points = solid.cells.points();
-        let kept = &own.kept[cell * points..(cell + 1) * points];
+        let kept = &parts.kept[cell * points..(cell + 1) * points];
         let Prony { isochoric, volumetric, .. } = &solid.material.prony;
         let counts = [false, isochoric.is_empty(), volumetric.is_empty()].map(|counts| counts || self.steps);
-        Lag { factors: own.factors, kept, counts }
+        Lag { factors: parts.factors, kept, counts }
     }
 
     /// Work of relaxing stresses so far [J], where energies of an instant are asked for.
@@ -174,17 +176,19 @@ impl Relaxation {
     ) {
         history.begun = true;
         let solids = self.solids.iter_mut().zip(&model.solids);
-        for (((own, solid), tensors), work) in solids.zip(&mut history.tensors).zip(&mut history.work) {
-            own.set_step(&solid.material.prony, Some(step));
-            let coefficients = &own.coefficients;
+        for (((parts, solid), tensors), work) in solids.zip(&mut history.tensors).zip(&mut history.work) {
+            parts.set_step(&solid.material.prony, Some(step));
+            let coefficients = &parts.coefficients;
             let slots = slots_of_cell(solid);
             if slots == 0 {
                 continue;
             }
-            let chunk = |(number, own): (usize, &mut [Symmetric<f64>])| {
-                let cells = own.chunks_exact_mut(slots).enumerate();
+            let chunk = |(number, of_chunk): (usize, &mut [Symmetric<f64>])| {
+                let cells = of_chunk.chunks_exact_mut(slots).enumerate();
                 cells
-                    .map(|(at, own)| advance(solid, number * CHUNK + at, (&before, &now), coefficients, own))
+                    .map(|(at, of_cell)| {
+                        advance(solid, number * CHUNK + at, (&before, &now), coefficients, of_cell)
+                    })
                     .sum()
             };
             tensors.par_chunks_mut(CHUNK * slots).enumerate().map(chunk).collect_into_vec(&mut self.sums);
@@ -195,14 +199,14 @@ impl Relaxation {
 
 /// f of one part, 1 − Σ a + Σ g.
 fn factor(terms: &[(f64, f64)], coefficients: &[(f64, f64)]) -> f64 {
-    terms.iter().zip(coefficients).fold(1.0, |sum, (term, own)| sum - term.0 + own.1)
+    terms.iter().zip(coefficients).fold(1.0, |sum, (term, coefficient)| sum - term.0 + coefficient.1)
 }
 
 /// k of a point with its tensors, Σ (d h − g Φ).
 fn kept(prony: &Prony, [shape, volume]: &[Vec<(f64, f64)>; 2], tensors: &[Symmetric<f64>]) -> Symmetric<f64> {
     let part = |coefficients: &[(f64, f64)], tensors: &[Symmetric<f64>]| {
-        let Some((elastic, own)) = tensors.split_first() else { return Symmetric::ZERO };
-        let of_terms = coefficients.iter().zip(own);
+        let Some((elastic, histories)) = tensors.split_first() else { return Symmetric::ZERO };
+        let of_terms = coefficients.iter().zip(histories);
         of_terms.fold(Symmetric::ZERO, |sum, (&(decay, gain), h)| sum + *h * decay - *elastic * gain)
     };
     let (isochoric, volumetric) = tensors.split_at(prony.isochoric_slots());
@@ -224,18 +228,18 @@ fn advance(
     visit_points(solid, cell, before, |point, _, strained| from[point] = strained.twice());
     let mut work = 0.0;
     visit_points(solid, cell, now, |point, weight, strained| {
-        let own = &mut tensors[point * slots..(point + 1) * slots];
+        let at_point = &mut tensors[point * slots..(point + 1) * slots];
         let elastic = strained.stress(&solid.material.law, &fibres);
-        let (first, second) = own.split_at_mut(solid.material.prony.isochoric_slots());
+        let (first, second) = at_point.split_at_mut(solid.material.prony.isochoric_slots());
         let mut sum = Symmetric::ZERO;
-        for (terms, coefficients, elastic, own) in
+        for (terms, coefficients, elastic, stored) in
             [(isochoric, shape, elastic.isochoric, first), (volumetric, volume, elastic.volumetric, second)]
         {
-            let Some((last, own)) = own.split_first_mut() else { continue };
+            let Some((last, histories)) = stored.split_first_mut() else { continue };
             let remaining = terms.iter().fold(1.0, |sum, (weight, _)| sum - weight);
             sum = sum + (*last + elastic) * remaining;
             let change = elastic - *last;
-            for (&(decay, gain), h) in coefficients.iter().zip(own) {
+            for (&(decay, gain), h) in coefficients.iter().zip(histories) {
                 sum = sum + *h;
                 *h = *h * decay + change * gain;
                 sum = sum + *h;

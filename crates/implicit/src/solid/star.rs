@@ -93,12 +93,17 @@ impl Stars {
     ) {
         let u = moved(block, cell, displacement);
         let rest = &block.rest[cell];
-        let mut own = [[0.0; 3]; 4];
-        add_volume_change(&mut own, &gradient(&u, &rest.gradient), &rest.gradient, 0.25 * rest.volume);
-        for (node, own) in block.nodes[cell].iter().zip(own) {
+        let mut cell_changes = [[0.0; 3]; 4];
+        add_volume_change(
+            &mut cell_changes,
+            &gradient(&u, &rest.gradient),
+            &rest.gradient,
+            0.25 * rest.volume,
+        );
+        for (node, change) in block.nodes[cell].iter().zip(cell_changes) {
             // Every node of a cell at the star's node is of the star.
             if let Ok(at) = nodes.binary_search(node) {
-                changes[at] = pliant_mechanics::tensor::add(changes[at], own);
+                changes[at] = pliant_mechanics::tensor::add(changes[at], change);
             }
         }
     }

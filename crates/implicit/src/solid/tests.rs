@@ -77,7 +77,7 @@ fn block(element: &str, law: AnyLaw, counts: [usize; 3], sides: [f64; 3]) -> Ass
 }
 
 /// Every element with laws of every kind that it takes.
-fn all() -> impl Iterator<Item = (&'static str, &'static str)> {
+fn elements_with_laws() -> impl Iterator<Item = (&'static str, &'static str)> {
     let laws = ["neo-hookean", "st-venant-kirchhoff", "ogden", "transversely-isotropic", "corotational"];
     let pairs = ELEMENTS.into_iter().flat_map(move |element| laws.map(|law| (element, law)));
     let takes_all = |element: &str| matches!(element, "tet4" | "hex8" | "growing-hex8");
@@ -103,7 +103,7 @@ fn force_and_stiffness_are_derivatives() {
         }
         None => ("membrane", name, law(name)),
     });
-    let solids = all().map(|(element, name)| (element, name, law(name)));
+    let solids = elements_with_laws().map(|(element, name)| (element, name, law(name)));
     let bars = ["bar", "thread"].map(|element| (element, "neo-hookean", law("neo-hookean")));
     for (element, name, law) in solids.chain(membranes).chain(bars) {
         let model = block(element, law, [2, 1, 2], [0.2, 0.1, 0.2]);
@@ -133,10 +133,10 @@ fn assert_derivatives(what: &str, system: &mut System, state: &AssemblyState) {
         (system.forces.energy, system.forces.internal.clone())
     };
     let (ahead, behind) = (at(h), at(-h));
-    let gather = |all: &[f64]| {
-        let mut own = vec![0.0; size];
-        system.gather(all, &mut own);
-        own
+    let gather = |components: &[f64]| {
+        let mut free = vec![0.0; size];
+        system.gather(components, &mut free);
+        free
     };
     let work: f64 = gather(&force).iter().zip(&along).map(|(f, d)| f * d).sum();
     let slope = (ahead.0 - behind.0) / (2.0 * h);
@@ -183,7 +183,7 @@ fn pressures_on_faces_have_their_stiffness() {
         let size = pressed.stiffness.equations.count();
         let along: Vec<f64> = (0..size).map(|_| random.number()).collect();
         let mut predicted = vec![0.0; size];
-        let own: Vec<f64> = pressed
+        let of_pressure: Vec<f64> = pressed
             .stiffness
             .matrix
             .value
@@ -191,7 +191,7 @@ fn pressures_on_faces_have_their_stiffness() {
             .zip(&bare.stiffness.matrix.value)
             .map(|(with, without)| with - without)
             .collect();
-        pressed.stiffness.matrix.multiply_values(&own, &along, &mut predicted);
+        pressed.stiffness.matrix.multiply_values(&of_pressure, &along, &mut predicted);
         let sum: f64 = pressed.forces.external.iter().sum();
         assert!(sum.abs() < 1e-10, "{element}: closed faces push with {sum} N");
         let h = 1e-6;
@@ -273,7 +273,7 @@ fn cantilever(element: &str, law: AnyLaw, force: f64, to: f64) -> Assembly {
 /// all elements and laws.
 #[test]
 fn newtons_method_converges_quadratically() {
-    for (element, name) in all() {
+    for (element, name) in elements_with_laws() {
         let model = cantilever(element, law(name), 0.5, 1.0);
         let mut state = AssemblyState::at_rest(&model);
         let settings = StaticSettings { tolerance: 1e-12, ..StaticSettings::default() };

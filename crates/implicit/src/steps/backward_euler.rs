@@ -212,15 +212,15 @@ impl BackwardEuler {
     ) -> Result<Self, SolveError> {
         let model = model.into();
         let system = System::on(device, Arc::clone(&model), settings.linear)?;
-        let (all, free) = (6 * model.rest.len(), system.stiffness.equations.count());
+        let (components, free) = (6 * model.rest.len(), system.stiffness.equations.count());
         Ok(Self {
             settings,
             length: model.mean_edge(),
             damping: model.damping(),
             round_off: model.round_off(),
-            pending: vec![0.0; all],
-            moved: vec![0.0; all],
-            increment: vec![0.0; all],
+            pending: vec![0.0; components],
+            moved: vec![0.0; components],
+            increment: vec![0.0; components],
             residual: vec![0.0; free],
             solution: vec![0.0; free],
             product: vec![0.0; free],
@@ -552,8 +552,8 @@ impl BackwardEuler {
     }
 
     fn worst_node(&self) -> u32 {
-        let all = self.system.stiffness.equations.component.iter().zip(&self.residual);
-        let largest = all.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+        let residuals = self.system.stiffness.equations.component.iter().zip(&self.residual);
+        let largest = residuals.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
         largest.map_or(0, |(component, _)| component / 6)
     }
 }

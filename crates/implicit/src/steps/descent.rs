@@ -361,9 +361,9 @@ fn begin(solver: &mut impl Contacting, state: &AssemblyState, times: [f64; 2], g
         Some(guess) => increment.copy_from_slice(guess),
         None => increment.fill(0.0),
     }
-    for (own, &pending) in increment.iter_mut().zip(pending.iter()) {
+    for (entry, &pending) in increment.iter_mut().zip(pending.iter()) {
         if pending != 0.0 {
-            *own = pending;
+            *entry = pending;
         }
     }
     system.follow(increment);
@@ -385,11 +385,11 @@ fn start_from(
     let here = state.clone();
     let Vectors { system, pending, increment, .. } = solver.vectors();
     increment.copy_from_slice(guess);
-    for ((own, &pending), number) in
+    for ((entry, &pending), number) in
         increment.iter_mut().zip(pending.iter()).zip(&system.stiffness.equations.number)
     {
         if *number == pliant_linear::sparse::NONE {
-            *own = pending;
+            *entry = pending;
         }
     }
     system.follow(increment);

@@ -113,8 +113,8 @@ impl Valve {
 
     /// Error at a time [s] if neither the volume nor the limit holds, in a step with inertia or without.
     fn snaps(&self, model: &Assembly, time: f64, inertia: bool) -> SolveError {
-        let own = &model.constraints[self.constraint];
-        let (constraint, node) = (own.name.clone(), own.nodes[0]);
+        let volume = &model.constraints[self.constraint];
+        let (constraint, node) = (volume.name.clone(), volume.nodes[0]);
         let Self { limit, pressure, ahead, .. } = *self;
         SolveError::Snaps { time, constraint, node, limit, pressure, ahead, inertia }
     }
@@ -148,7 +148,7 @@ pub(crate) fn within_limits<S: Contacting, T, E: From<SolveError>>(
         let Vectors { system, pending, .. } = solver.vectors();
         pending.copy_from_slice(&whole);
         system.hold_back([start.time, time], &mut guesses, pending);
-        valves.iter().for_each(|own| system.conditions.give_pressure(own.constraint, own.given));
+        valves.iter().for_each(|valve| system.conditions.give_pressure(valve.constraint, valve.given));
         let solved = solve(solver, state)?;
         if !valves.is_empty() && solver.system_mut().contact.is_some() {
             // The last motion of a step in contact was made without finding the residual after it.
@@ -156,8 +156,8 @@ pub(crate) fn within_limits<S: Contacting, T, E: From<SolveError>>(
         }
         let unkept = solver.system_mut().unkept(&mut valves);
         let mut agree = unkept.is_none();
-        if let Some(own) = unkept.filter(|own| own.changes > CHANGES || tries == 0) {
-            return Err(own.snaps(&solver.system_mut().model, time, S::INERTIA).into());
+        if let Some(valve) = unkept.filter(|valve| valve.changes > CHANGES || tries == 0) {
+            return Err(valve.snaps(&solver.system_mut().model, time, S::INERTIA).into());
         }
         for (guess, force) in guesses.iter_mut().zip(solver.system_mut().bear_on()) {
             agree &= guess.take(force);
@@ -173,7 +173,10 @@ pub(crate) fn within_limits<S: Contacting, T, E: From<SolveError>>(
 impl System {
     /// First guesses for the tools, and then the moved nodes, whose force is limited.
     fn guesses(&self) -> Vec<Guess> {
-        let tools = self.contact.iter().flat_map(|own| own.lags().iter().map(|lag| (lag, own.limit(lag))));
+        let tools = self
+            .contact
+            .iter()
+            .flat_map(|contact| contact.lags().iter().map(|lag| (lag, contact.limit(lag))));
         let nodes = self.lags.iter().filter(|lag| !encloses(&self.model, lag));
         let nodes = nodes.map(|lag| (lag, self.model.force_limits[&lag.number()]));
         tools.chain(nodes).map(|(lag, limit)| Guess::new(lag.force(), limit)).collect()
@@ -181,14 +184,15 @@ impl System {
 
     /// Volumes whose pressure is limited: those that lag have it as a load.
     fn valves(&self) -> Vec<Valve> {
-        let own = self.lags.iter().filter(|lag| encloses(&self.model, lag));
-        own.map(|lag| {
-            let (constraint, behind) = (lag.number(), -lag.now().x);
-            let limit = self.model.force_limits[&constraint];
-            let given = (behind != 0.0).then(|| limit.copysign(behind));
-            Valve { constraint, limit, given, changes: 0, pressure: None, ahead: None }
-        })
-        .collect()
+        let enclosing = self.lags.iter().filter(|lag| encloses(&self.model, lag));
+        enclosing
+            .map(|lag| {
+                let (constraint, behind) = (lag.number(), -lag.now().x);
+                let limit = self.model.force_limits[&constraint];
+                let given = (behind != 0.0).then(|| limit.copysign(behind));
+                Valve { constraint, limit, given, changes: 0, pressure: None, ahead: None }
+            })
+            .collect()
     }
 
     /// Takes pressures and volumes at the residual last found, and the lags of volumes. Returns the valve
@@ -217,15 +221,15 @@ impl System {
         }
         let lags = self.lags.iter_mut().filter(|lag| !encloses(&self.model, lag));
         for (lag, guess) in lags.zip(nodes) {
-            let own = &self.model.constraints[lag.number()];
-            let held = || (0..3).filter(|&c| own.components[c]);
+            let constraint = &self.model.constraints[lag.number()];
+            let held = || (0..3).filter(|&c| constraint.components[c]);
             let mut way = Vector3::zeros();
-            for at in own.nodes.iter().map(|&node| 6 * node as usize) {
-                held().for_each(|c| way[c] += pending[at + c] / own.nodes.len() as f64);
+            for at in constraint.nodes.iter().map(|&node| 6 * node as usize) {
+                held().for_each(|c| way[c] += pending[at + c] / constraint.nodes.len() as f64);
             }
             guess.into = lag.go(guess.ahead, guess.part, way, to - from);
             let shift = lag.next() - lag.now();
-            for at in own.nodes.iter().map(|&node| 6 * node as usize) {
+            for at in constraint.nodes.iter().map(|&node| 6 * node as usize) {
                 held().for_each(|c| pending[at + c] += shift[c]);
             }
         }
@@ -235,12 +239,12 @@ impl System {
     /// Gives each lag the force [N] with which its tool or its nodes push at the state last evaluated; these
     /// forces.
     fn bear_on(&mut self) -> Vec<Vector3<f64>> {
-        let mut forces = self.contact.as_mut().map(|own| own.bear_on()).unwrap_or_default();
+        let mut forces = self.contact.as_mut().map(|contact| contact.bear_on()).unwrap_or_default();
         for lag in self.lags.iter_mut().filter(|lag| !encloses(&self.model, lag)) {
-            let own = &self.model.constraints[lag.number()];
+            let constraint = &self.model.constraints[lag.number()];
             let mut force = Vector3::zeros();
-            for at in own.nodes.iter().map(|&node| 6 * node as usize) {
-                let held = (0..3).filter(|&c| own.components[c]);
+            for at in constraint.nodes.iter().map(|&node| 6 * node as usize) {
+                let held = (0..3).filter(|&c| constraint.components[c]);
                 held.for_each(|c| force[c] += self.forces.internal[at + c] - self.forces.external[at + c]);
             }
             lag.found(force);

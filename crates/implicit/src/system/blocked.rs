@@ -19,7 +19,7 @@ impl System {
         if self.evaluate(state, state.time, None).is_err() {
             return error;
         }
-        let gap = self.contact.as_ref().and_then(|own| own.step.least_gap()).unwrap_or(f64::INFINITY);
+        let gap = self.contact.as_ref().and_then(|contact| contact.step.least_gap()).unwrap_or(f64::INFINITY);
         let driver = self.hardest_driver([state.time, time]);
         if driver.is_none() && self.conditions.are_closed() {
             // Nothing is driven: loads press what does not come to rest.
@@ -32,27 +32,28 @@ impl System {
     /// [N] at the state last evaluated.
     fn hardest_driver(&self, [from, to]: [f64; 2]) -> Option<(String, f64)> {
         let resisting = |at: usize| self.forces.internal[at] - self.forces.external[at];
-        let held = |own: &Constraint| {
-            let goes = |index: usize| own.motion.increment(index, from, to) != [0.0; 6];
-            if matches!(own.motion, Motion::Fixed) || !(0..own.nodes.len()).any(goes) {
+        let held = |constraint: &Constraint| {
+            let goes = |index: usize| constraint.motion.increment(index, from, to) != [0.0; 6];
+            if matches!(constraint.motion, Motion::Fixed) || !(0..constraint.nodes.len()).any(goes) {
                 return None;
             }
-            let along = |c: usize| own.nodes.iter().map(|&node| resisting(6 * node as usize + c)).sum();
-            let force = Vector3::from_fn(|c, _| if own.components[c] { along(c) } else { 0.0 });
-            Some((own.name.clone(), force.norm()))
+            let along =
+                |c: usize| constraint.nodes.iter().map(|&node| resisting(6 * node as usize + c)).sum();
+            let force = Vector3::from_fn(|c, _| if constraint.components[c] { along(c) } else { 0.0 });
+            Some((constraint.name.clone(), force.norm()))
         };
-        let constraints = self.model.constraints.iter().filter_map(|own| match &own.motion {
+        let constraints = self.model.constraints.iter().filter_map(|constraint| match &constraint.motion {
             Motion::Mean { by, curve, .. } => {
                 let goes = *by != [0.0; 3] && curve.value(from) != curve.value(to);
-                let force = own.mean_force(|node| [0, 1, 2].map(|c| resisting(6 * node as usize + c)));
-                goes.then(|| (own.name.clone(), Vector3::from(force).norm()))
+                let force = constraint.mean_force(|node| [0, 1, 2].map(|c| resisting(6 * node as usize + c)));
+                goes.then(|| (constraint.name.clone(), Vector3::from(force).norm()))
             }
             motion if motion.is_collective() => None,
-            _ => held(own),
+            _ => held(constraint),
         });
-        let tools = self.contact.iter().flat_map(|own| own.pushing([from, to]));
+        let tools = self.contact.iter().flat_map(|contact| contact.pushing([from, to]));
         constraints.chain(tools).fold(None, |hardest: Option<(String, f64)>, next| match hardest {
-            Some(own) if own.1 >= next.1 => Some(own),
+            Some(hardest) if hardest.1 >= next.1 => Some(hardest),
             _ => Some(next),
         })
     }

@@ -81,26 +81,32 @@ impl Conditions {
                 rows.push(row);
             }
         };
-        for (constraint, own) in model.constraints.iter().enumerate() {
-            match &own.motion {
+        for (number, constraint) in model.constraints.iter().enumerate() {
+            match &constraint.motion {
                 Motion::Mean { weights, .. } => {
-                    for component in (0..3).filter(|&c| own.components[c]) {
+                    for component in (0..3).filter(|&c| constraint.components[c]) {
                         let mut dense = vec![0.0; equations.count()];
-                        for (&node, weight) in own.nodes.iter().zip(weights) {
+                        for (&node, weight) in constraint.nodes.iter().zip(weights) {
                             let equation = equations.number[6 * node as usize + component];
                             if equation != NONE {
                                 dense[equation as usize] = *weight;
                             }
                         }
-                        add(constraint, Kind::Mean(component), dense, CLOSED * model.mean_edge());
+                        add(number, Kind::Mean(component), dense, CLOSED * model.mean_edge());
                     }
                 }
                 Motion::Volume { enclosure, .. } => {
                     let mut dense = vec![0.0; equations.count()];
                     let rest = AssemblyState::at_rest(model);
-                    let volume =
-                        add_gradient(model, surface, own, enclosure, &rest, &mut into(equations, &mut dense));
-                    add(constraint, Kind::Volume(volume), dense, CLOSED * volume.abs());
+                    let volume = add_gradient(
+                        model,
+                        surface,
+                        constraint,
+                        enclosure,
+                        &rest,
+                        &mut into(equations, &mut dense),
+                    );
+                    add(number, Kind::Volume(volume), dense, CLOSED * volume.abs());
                 }
                 _ => {}
             }
@@ -128,7 +134,7 @@ impl Conditions {
             (Some(at), Some(pressure)) => self.loose[at].1 = pressure,
             (Some(at), None) => {
                 let (row, _) = self.loose.remove(at);
-                let place = self.rows.partition_point(|own| own.constraint < constraint);
+                let place = self.rows.partition_point(|known| known.constraint < constraint);
                 self.rows.insert(place, row);
             }
             (None, Some(pressure)) => {
@@ -144,8 +150,8 @@ impl Conditions {
     /// still needs, and its rest volume [m³].
     pub(crate) fn enclosed(&self, constraint: usize) -> Option<[f64; 3]> {
         let given = self.loose.iter().map(|(row, pressure)| (row, *pressure));
-        let all = self.rows.iter().map(|row| (row, -row.force)).chain(given);
-        all.filter(|(row, _)| row.constraint == constraint).find_map(|(row, pressure)| match row.kind {
+        let rows = self.rows.iter().map(|row| (row, -row.force)).chain(given);
+        rows.filter(|(row, _)| row.constraint == constraint).find_map(|(row, pressure)| match row.kind {
             Kind::Volume(rest) => Some([pressure, row.gap, rest]),
             Kind::Mean(_) => None,
         })
@@ -171,13 +177,13 @@ impl Conditions {
         time: f64,
     ) {
         for row in self.rows.iter_mut().chain(self.loose.iter_mut().map(|(row, _)| row)) {
-            let own = &model.constraints[row.constraint];
-            match (&own.motion, &row.kind) {
+            let constraint = &model.constraints[row.constraint];
+            match (&constraint.motion, &row.kind) {
                 (Motion::Mean { weights, by, curve }, &Kind::Mean(component)) => {
                     let moved = |(&node, weight): (&u32, &f64)| {
                         weight * model.displacement(&state.position, node)[component]
                     };
-                    let sum = own.nodes.iter().zip(weights).map(moved).sum::<f64>();
+                    let sum = constraint.nodes.iter().zip(weights).map(moved).sum::<f64>();
                     row.gap = by[component] * curve.value(time) - sum;
                 }
                 (Motion::Volume { enclosure, by, curve }, Kind::Volume(rest)) => {
@@ -185,7 +191,7 @@ impl Conditions {
                     let volume = add_gradient(
                         model,
                         surface,
-                        own,
+                        constraint,
                         enclosure,
                         state,
                         &mut into(equations, &mut row.dense),
@@ -208,13 +214,13 @@ impl Conditions {
         resisting: impl Fn(usize) -> f64,
     ) -> Vec<(&'a Constraint, &'a Enclosure, f64)> {
         let of = |(row, given): (&Row, Option<f64>)| {
-            let own = &model.constraints[row.constraint];
-            let Motion::Volume { enclosure, .. } = &own.motion else { return None };
+            let constraint = &model.constraints[row.constraint];
+            let Motion::Volume { enclosure, .. } = &constraint.motion else { return None };
             let along = || {
                 let along = row.dense.iter().zip(&equations.component);
                 along.map(|(g, &component)| g * resisting(component as usize)).sum::<f64>() / row.squared
             };
-            Some((own, enclosure, given.unwrap_or_else(along)))
+            Some((constraint, enclosure, given.unwrap_or_else(along)))
         };
         let loose = self.loose.iter().map(|(row, pressure)| (row, Some(*pressure)));
         self.rows.iter().map(|row| (row, None)).chain(loose).filter_map(of).collect()
@@ -259,9 +265,9 @@ impl Conditions {
             solve(&right, to_pin)?;
             right[*pin] = 0.0;
         }
-        let own = &self.rows;
+        let rows = &self.rows;
         let entry = |i: usize, j: usize| {
-            let (row, column) = (&own[i % count], &own[j % count]);
+            let (row, column) = (&rows[i % count], &rows[j % count]);
             let answer = &column.answers[j / count];
             let at = if i < count { dot(&row.dense, answer) } else { row.spring * answer[row.pin] };
             let sign = if j < count { 1.0 } else { -1.0 };
@@ -313,13 +319,13 @@ fn into<'a>(equations: &'a Equations, dense: &'a mut [f64]) -> impl FnMut(usize,
 pub(crate) fn add_gradient(
     model: &Assembly,
     surface: Option<&CurvedSurface>,
-    own: &Constraint,
+    constraint: &Constraint,
     enclosure: &Enclosure,
     state: &AssemblyState,
     add: &mut dyn FnMut(usize, f64),
 ) -> f64 {
-    let node = |at: u32| own.nodes[at as usize] as usize;
-    let mut gradient = vec![[0.0; 3]; own.nodes.len()];
+    let node = |at: u32| constraint.nodes[at as usize] as usize;
+    let mut gradient = vec![[0.0; 3]; constraint.nodes.len()];
     let mut volume = enclosure.add_gradient(|at| state.position[node(at)].into(), &mut gradient);
     for (at, g) in gradient.iter().enumerate().filter(|(_, g)| **g != [0.0; 3]) {
         (0..3).for_each(|c| add(6 * node(at as u32) + c, g[c]));

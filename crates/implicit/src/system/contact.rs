@@ -222,15 +222,15 @@ impl ContactSystem {
                     self.step.find_moments(&mut self.moments);
                 }
             }
-            Some((samples, all)) => {
+            Some((samples, point_forces)) => {
                 samples.place(&self.model, state);
                 self.energy = self.step.evaluate(&samples.places, self.time_fraction);
-                all.fill(0.0);
+                point_forces.fill(0.0);
                 if self.energy.is_finite() {
-                    self.step.add_forces(all, &mut self.totals);
+                    self.step.add_forces(point_forces, &mut self.totals);
                     self.step.find_moments(&mut self.moments);
                 }
-                samples.give_back(&self.model, all, &mut self.forces);
+                samples.give_back(&self.model, point_forces, &mut self.forces);
             }
         }
         self.given.copy_from_slice(&self.forces);
@@ -390,8 +390,11 @@ impl ContactSystem {
         followers: Option<&Followers>,
     ) -> bool {
         let mut lacks = false;
-        let movers =
-            Movers { model: &self.model, followers, samples: self.samples.as_ref().map(|own| &own.0) };
+        let movers = Movers {
+            model: &self.model,
+            followers,
+            samples: self.samples.as_ref().map(|sampled| &sampled.0),
+        };
         self.step.acting(|nodes| {
             movers.each_pair(nodes, |pair| lacks = lacks || !matrix.couples(equations, pair));
         });
@@ -431,10 +434,10 @@ impl ContactSystem {
         // Nodes that move a collision's nodes: their number, place in the stencil, and weight.
         let mut movers: Vec<(u32, usize, f64)> = Vec::new();
         self.step.stiffness(|stencil, block, mut ways| {
-            let own = |at: usize| stencil.nodes[at] as usize;
+            let node_at = |at: usize| stencil.nodes[at] as usize;
             let count = usize::from(stencil.count);
             movers.clear();
-            for at in (0..count).filter(|&at| own(at) < nodes && acts(block, at)) {
+            for at in (0..count).filter(|&at| node_at(at) < nodes && acts(block, at)) {
                 movers_of(stencil.nodes[at], followers, |node, weight| movers.push((node, at, weight)));
             }
             for &(row_node, row, w) in &movers {
@@ -446,8 +449,8 @@ impl ContactSystem {
                 }
             }
             // The rest of the way of prescribed nodes counts like the way of rigid things.
-            for (at, way) in ways.iter_mut().enumerate().take(count).filter(|(at, _)| own(*at) < nodes) {
-                *way += Vector3::from_column_slice(&moved[6 * own(at)..6 * own(at) + 3]);
+            for (at, way) in ways.iter_mut().enumerate().take(count).filter(|(at, _)| node_at(*at) < nodes) {
+                *way += Vector3::from_column_slice(&moved[6 * node_at(at)..6 * node_at(at) + 3]);
             }
             if ways == [Vector3::zeros(); 4] {
                 return;
@@ -458,8 +461,8 @@ impl ContactSystem {
                     .sum();
                 for i in 0..3 {
                     let equation = equations.number[6 * node as usize + i];
-                    if let Some(own) = coupling.get_mut(equation as usize) {
-                        *own += weight * pull[i];
+                    if let Some(entry) = coupling.get_mut(equation as usize) {
+                        *entry += weight * pull[i];
                     }
                 }
             }

@@ -68,8 +68,8 @@ impl Facets {
         followers: Option<&Followers>,
         places: impl Fn(&[u32]) -> Vec<u32>,
     ) {
-        let follows = |own: &Followers, facet: &Facet| own.expanded(&facet.nodes, true).is_some();
-        let is_bound = |facet: &Facet| followers.is_some_and(|own| follows(own, facet));
+        let follows = |followers: &Followers, facet: &Facet| followers.expanded(&facet.nodes, true).is_some();
+        let is_bound = |facet: &Facet| followers.is_some_and(|followers| follows(followers, facet));
         self.places = model.facets.iter().map(|facet| places(&facet.nodes)).collect();
         self.bound = model.facets.iter().map(is_bound).collect();
     }
@@ -188,7 +188,7 @@ impl Gathering<'_> {
             let (values, column_start) = matrix.values();
             ColumnSums { first: 0, coupling, values, column_start }
         });
-        let forces = sums.forces.all();
+        let forces = sums.forces.kinds();
         let (facets, pressure) = (&self.model.facets[first..], &self.pressure[first..]);
         let take = |node: u32, corners: &[u32], sums: &mut NodeSums<'_>| {
             for &corner in corners {
@@ -235,7 +235,7 @@ fn needs_surface(model: &Assembly) -> bool {
         let curved = matches!(load.kind, LoadKind::ShellPressure { spread: Spread::Curved, .. });
         curved || load.surface.is_some_and(|surface| model.carried.contains_key(&surface))
     };
-    let encloses = |own: &Constraint| matches!(&own.motion, Motion::Volume { enclosure, .. } if !enclosure.facets.is_empty());
+    let encloses = |constraint: &Constraint| matches!(&constraint.motion, Motion::Volume { enclosure, .. } if !enclosure.facets.is_empty());
     model.loads.iter().any(loads) || model.constraints.iter().any(encloses)
 }
 
@@ -400,8 +400,8 @@ fn follow(k: &mut Matrix18, x: &[Vector3<f64>; 3], pressure: f64, symmetric: boo
     let opposite = [0, 1, 2].map(|j| (x[(j + 2) % 3] - x[(j + 1) % 3]) * (pressure / 6.0));
     for (i, j) in (0..3).flat_map(|j| (0..3).map(move |i| (i, j))) {
         // Of a block S(a) and its mirror S(b)ᵀ = −S(b) the mean.
-        let own = if symmetric { (opposite[j] - opposite[i]) * 0.5 } else { opposite[j] };
+        let axial = if symmetric { (opposite[j] - opposite[i]) * 0.5 } else { opposite[j] };
         let mut block = k.fixed_view_mut::<3, 3>(6 * i, 6 * j);
-        block -= skew(&own);
+        block -= skew(&axial);
     }
 }

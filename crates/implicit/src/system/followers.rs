@@ -84,7 +84,8 @@ impl Followers {
         let turning = model.turning();
         let mut turned = Vec::new();
         let mut rows: Vec<(u32, Vec<Followed>)> = Vec::new();
-        let bound = model.constraints.iter().filter(|own| rigid && matches!(own.motion, Motion::Rigid));
+        let bound =
+            model.constraints.iter().filter(|constraint| rigid && matches!(constraint.motion, Motion::Rigid));
         for constraint in bound {
             let part = parts.len();
             parts.push(RigidPart::of(model, &constraint.nodes, &turning));
@@ -101,26 +102,26 @@ impl Followers {
             }
         };
         for (node, row) in model.ties.iter().flat_map(Tie::rows) {
-            let mut own: Vec<Followed> = Vec::new();
+            let mut merged: Vec<Followed> = Vec::new();
             for next in row.map(|(node, weight)| followed(node, weight)) {
-                match own.iter_mut().find(|known| known.part.is_some() && known.node == next.node) {
+                match merged.iter_mut().find(|known| known.part.is_some() && known.node == next.node) {
                     Some(known) => {
                         known.weight += next.weight;
                         known.rest += next.rest;
                         known.arm += next.arm;
                     }
-                    None => own.push(next),
+                    None => merged.push(next),
                 }
             }
-            rows.push((node, own));
+            rows.push((node, merged));
         }
         for node in (0..model.rest.len() as u32)
             .filter(|&node| part_of[node as usize].is_some_and(|part: usize| parts[part].first != node))
         {
             rows.push((node, vec![followed(node, 1.0)]));
         }
-        let all = model.ties.iter().flat_map(|tie| tie.nodes.iter().copied().zip(tie.held.iter().copied()));
-        let mut held: Vec<(u32, [bool; 3])> = all.filter(|(_, held)| held.contains(&true)).collect();
+        let tied = model.ties.iter().flat_map(|tie| tie.nodes.iter().copied().zip(tie.held.iter().copied()));
+        let mut held: Vec<(u32, [bool; 3])> = tied.filter(|(_, held)| held.contains(&true)).collect();
         held.sort_unstable();
         let mut row_of = vec![NONE; model.rest.len()];
         for ((node, _), number) in rows.iter().zip(0..) {
@@ -139,7 +140,7 @@ impl Followers {
 
     /// The components of a node that do not follow.
     fn held(&self, node: u32) -> [bool; 3] {
-        let found = self.held.binary_search_by_key(&node, |(own, _)| *own);
+        let found = self.held.binary_search_by_key(&node, |(known, _)| *known);
         found.map_or([false; 3], |at| self.held[at].1)
     }
 
@@ -150,7 +151,7 @@ impl Followers {
 
     /// The node that a node turns with, itself if with no other.
     fn turns_with(&self, node: u32) -> u32 {
-        match self.turned.binary_search_by_key(&node, |[own, _]| *own) {
+        match self.turned.binary_search_by_key(&node, |[known, _]| *known) {
             Ok(at) => self.turned[at][1],
             Err(_) => node,
         }
@@ -180,17 +181,17 @@ impl Followers {
         }
         let turn = |node: &u32| turns && !carried(node);
         let stays = |node: &u32| !self.follows(*node) || self.held(*node).contains(&true);
-        let mut all: Vec<u32> = nodes.iter().copied().filter(|node| turn(node) || stays(node)).collect();
+        let mut found: Vec<u32> = nodes.iter().copied().filter(|node| turn(node) || stays(node)).collect();
         let solids = nodes.iter().filter(|node| carried(node)).filter_map(|&node| self.carried(node));
         for moving in nodes.iter().copied().chain(solids.flat_map(Turn::nodes)) {
             for node in self.movers(moving) {
-                if !all.contains(&node) {
-                    all.push(node);
+                if !found.contains(&node) {
+                    found.push(node);
                 }
             }
         }
-        let turns = nodes.iter().any(turn) || all.iter().any(first);
-        Some((all, if turns { 6 } else { 3 }))
+        let turns = nodes.iter().any(turn) || found.iter().any(first);
+        Some((found, if turns { 6 } else { 3 }))
     }
 
     /// The nodes that a node follows, with their weights; nothing, if it follows no other.
@@ -200,8 +201,8 @@ impl Followers {
 
     /// The nodes whose unknowns move a node: itself, or those that it follows.
     fn movers(&self, node: u32) -> impl Iterator<Item = u32> + '_ {
-        let own = (!self.follows(node)).then_some(node);
-        own.into_iter().chain(self.followed(node).iter().map(|followed| followed.node))
+        let itself = (!self.follows(node)).then_some(node);
+        itself.into_iter().chain(self.followed(node).iter().map(|followed| followed.node))
     }
 
     /// Computes Tᵀ K T of a cell on its [`expanded`](Self::expanded) nodes, column by column, for a number of
@@ -214,41 +215,41 @@ impl Followers {
         tangent: &[f64],
     ) -> Vec<f64> {
         let place = |node: u32| wide * expanded.iter().position(|&known| known == node).unwrap_or(0);
-        let shift = |node: u32, c: usize, by: f64, all: &mut Vec<(usize, f64)>| {
+        let shift = |node: u32, c: usize, by: f64, entries: &mut Vec<(usize, f64)>| {
             let followed = self.followed(node);
             if followed.is_empty() || self.held(node)[c] {
-                all.push((place(node) + c, by));
+                entries.push((place(node) + c, by));
                 return;
             }
             for Followed { node, weight, part, arm, .. } in followed {
                 let at = place(*node);
-                all.push((at + c, by * weight));
+                entries.push((at + c, by * weight));
                 if part.is_some() {
                     let [next, last] = [(c + 1) % 3, (c + 2) % 3];
-                    all.extend([(at + 3 + next, by * arm[last]), (at + 3 + last, -by * arm[next])]);
+                    entries.extend([(at + 3 + next, by * arm[last]), (at + 3 + last, -by * arm[next])]);
                 }
             }
         };
         // Of each component the unknowns that move it.
         let moves = |i: usize| -> Vec<(usize, f64)> {
             let (node, c) = (nodes[i / components], i % components);
-            let mut all = Vec::new();
+            let mut entries = Vec::new();
             match self.carried(node).filter(|_| c >= 3) {
-                _ if c < 3 => shift(node, c, 1.0, &mut all),
-                None => all.push((place(self.turns_with(node)) + c, 1.0)),
+                _ if c < 3 => shift(node, c, 1.0, &mut entries),
+                None => entries.push((place(self.turns_with(node)) + c, 1.0)),
                 Some(turn) => {
                     for (node, block) in turn.blocks() {
-                        (0..3).for_each(|k| shift(node, k, block[(c - 3, k)], &mut all));
+                        (0..3).for_each(|k| shift(node, k, block[(c - 3, k)], &mut entries));
                     }
                 }
             }
-            all
+            entries
         };
-        let all: Vec<_> = (0..components * nodes.len()).map(moves).collect();
-        let (count, size) = (all.len(), wide * expanded.len());
+        let unknowns: Vec<_> = (0..components * nodes.len()).map(moves).collect();
+        let (count, size) = (unknowns.len(), wide * expanded.len());
         // K T first, then Tᵀ (K T): a component of a carried turn has some thirty entries.
         let mut moved = vec![0.0; count * size];
-        for (column, entries) in all.iter().zip(tangent.chunks_exact(count)) {
+        for (column, entries) in unknowns.iter().zip(tangent.chunks_exact(count)) {
             for &(q, w) in column {
                 moved[q * count..][..count]
                     .iter_mut()
@@ -258,7 +259,7 @@ impl Followers {
         }
         let mut whole = vec![0.0; size * size];
         for (column, entries) in whole.chunks_exact_mut(size).zip(moved.chunks_exact(count)) {
-            for (row, entry) in all.iter().zip(entries) {
+            for (row, entry) in unknowns.iter().zip(entries) {
                 row.iter().for_each(|&(p, w)| column[p] += w * entry);
             }
         }
@@ -274,14 +275,14 @@ impl Followers {
             let along = |c: usize| {
                 let of = |followed: &Followed| {
                     let Followed { node, weight, part, arm, .. } = followed;
-                    let own = &components[6 * *node as usize..];
+                    let of_leader = &components[6 * *node as usize..];
                     let [next, last] = [(c + 1) % 3, (c + 2) % 3];
                     let turned = if part.is_some() {
-                        own[3 + next] * arm[last] - own[3 + last] * arm[next]
+                        of_leader[3 + next] * arm[last] - of_leader[3 + last] * arm[next]
                     } else {
                         0.0
                     };
-                    weight * own[c] + turned
+                    weight * of_leader[c] + turned
                 };
                 row.iter().map(of).sum::<f64>()
             };
@@ -300,9 +301,9 @@ impl Followers {
     /// Gives the moments on nodes that turn with a solid to that, six components a node.
     pub(crate) fn give_moments_back(&self, components: &mut [f64]) {
         for turn in &self.turns {
-            let own = &mut components[6 * turn.node as usize + 3..][..3];
-            let moment = Vector3::from_column_slice(own);
-            own.fill(0.0);
+            let on_node = &mut components[6 * turn.node as usize + 3..][..3];
+            let moment = Vector3::from_column_slice(on_node);
+            on_node.fill(0.0);
             for (node, force) in turn.forces(&moment) {
                 (0..3).for_each(|c| components[6 * node as usize + c] += force[c]);
             }
@@ -338,7 +339,7 @@ impl Followers {
         let bound = self.rows.iter().filter(|(_, row)| row.iter().any(|followed| followed.part.is_some()));
         let places: Vec<_> = bound
             .map(|(node, row)| {
-                (*node, row.iter().fold(model.place(*node as usize), |sum, own| sum + moved(own)))
+                (*node, row.iter().fold(model.place(*node as usize), |sum, leader| sum + moved(leader)))
             })
             .collect();
         for (node, place) in places {
@@ -371,8 +372,8 @@ impl Followers {
     /// all axes.
     pub(crate) fn spring(&self, node: u32, stiffness: f64) -> Option<(Expanded, Vec<f64>)> {
         let expanded = self.expanded(&[node], false)?;
-        let own = Matrix3::from_diagonal_element(stiffness);
-        let whole = self.condensed(&[node], 3, &expanded, own.as_slice());
+        let diagonal = Matrix3::from_diagonal_element(stiffness);
+        let whole = self.condensed(&[node], 3, &expanded, diagonal.as_slice());
         Some((expanded, whole))
     }
 
@@ -390,7 +391,7 @@ impl Followers {
                     (0..3).for_each(|c| add(6 * node as usize + c, force[c]));
                 }
                 let followed = self.followed(node).iter();
-                followed.for_each(|own| own.pull(&force, |c, f| add(6 * own.node as usize + c, f)));
+                followed.for_each(|leader| leader.pull(&force, |c, f| add(6 * leader.node as usize + c, f)));
             }
         }
         for &[node, first] in &self.turned {
@@ -399,7 +400,7 @@ impl Followers {
         }
         for (node, row) in &self.rows {
             let parts = row.iter().filter(|followed| followed.part.is_some());
-            parts.for_each(|own| own.pull(&force(*node), |c, f| add(6 * own.node as usize + c, f)));
+            parts.for_each(|part| part.pull(&force(*node), |c, f| add(6 * part.node as usize + c, f)));
         }
     }
 
@@ -415,15 +416,15 @@ impl Followers {
         for turn in &self.turns {
             let nodes: Vec<u32> = turn.nodes().collect();
             let change = turn.change(&moment(turn.node), rotary(turn.node));
-            let (own, components, whole) = match self.expanded(&nodes, false) {
+            let (moving, components, whole) = match self.expanded(&nodes, false) {
                 Some(expanded) => {
                     let whole = self.condensed(&nodes, 3, &expanded, &change);
                     (expanded.0, expanded.1, whole)
                 }
                 None => (nodes, 3, change),
             };
-            let places = matrix.places(equations, &own, components);
-            matrix.add(equations, &Cell { nodes: &own, components, places: &places, entries: &whole });
+            let places = matrix.places(equations, &moving, components);
+            matrix.add(equations, &Cell { nodes: &moving, components, places: &places, entries: &whole });
         }
     }
 

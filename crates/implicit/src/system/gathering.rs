@@ -19,18 +19,19 @@ pub(crate) struct Corners {
 impl Corners {
     /// Finds the corners of facets with the given nodes.
     pub(crate) fn of(facets: impl Iterator<Item = [u32; 3]>) -> Self {
-        let mut all: Vec<(u32, u32)> = facets.flatten().zip(0..).collect();
-        all.sort_unstable();
-        let mut own = Self { node: Vec::new(), start: Vec::new(), corner: Vec::with_capacity(all.len()) };
-        for (node, corner) in all {
-            if own.node.last() != Some(&node) {
-                own.node.push(node);
-                own.start.push(own.corner.len() as u32);
+        let mut pairs: Vec<(u32, u32)> = facets.flatten().zip(0..).collect();
+        pairs.sort_unstable();
+        let mut corners =
+            Self { node: Vec::new(), start: Vec::new(), corner: Vec::with_capacity(pairs.len()) };
+        for (node, corner) in pairs {
+            if corners.node.last() != Some(&node) {
+                corners.node.push(node);
+                corners.start.push(corners.corner.len() as u32);
             }
-            own.corner.push(corner);
+            corners.corner.push(corner);
         }
-        own.start.push(own.corner.len() as u32);
-        own
+        corners.start.push(corners.corner.len() as u32);
+        corners
     }
 
     /// Calls `take` for each node. Its arguments are the node, its corners (facet in the chunk, corner of the
@@ -92,7 +93,7 @@ impl NodeSums<'_> {
     fn split_at(self, equations: &Equations, node: u32) -> (Self, Self) {
         let components = 6 * (node - self.first) as usize;
         let [internal, fixed, controlled] = self.forces.map(|forces| forces.split_at_mut(components));
-        let (before, after) = self.stiffness.map(|own| own.split_at(equations.before(node))).unzip();
+        let (before, after) = self.stiffness.map(|columns| columns.split_at(equations.before(node))).unzip();
         let of = |first, forces, stiffness| Self { first, forces, stiffness };
         (
             of(self.first, [internal.0, fixed.0, controlled.0], before),
@@ -147,11 +148,13 @@ mod tests {
         let mut coupling = vec![0.0; equations.count()];
         let (values, column_start) = matrix.values();
         let stiffness = ColumnSums { first: 0, coupling: &mut coupling, values, column_start };
-        let forces = forces.each_mut().map(|own| &mut own[..]);
+        let forces = forces.each_mut().map(|vector| &mut vector[..]);
         let sums = NodeSums { first: 0, forces, stiffness: Some(stiffness) };
         let take = |_: u32, corners: &[u32], sums: &mut NodeSums<'_>| {
-            let Some(own) = &mut sums.stiffness else { return };
-            corners.iter().for_each(|&c| own.values.add(&equations, &cell(c as usize / 3), c as usize % 3));
+            let Some(columns) = &mut sums.stiffness else { return };
+            corners
+                .iter()
+                .for_each(|&c| columns.values.add(&equations, &cell(c as usize / 3), c as usize % 3));
         };
         Corners::of(facets.iter().copied()).visit(&equations, sums, &take);
         assert_eq!(matrix.value, expected.value);

@@ -31,7 +31,7 @@ impl System {
                     target[6 * node as usize + first + c] += factor * force[c];
                 }
             };
-            let points = load.surface.map(|own| CarriedPoints::new(model, surface.as_ref(), own));
+            let points = load.surface.map(|number| CarriedPoints::new(model, surface.as_ref(), number));
             let mut apply = |at: u32, force: [f64; 3]| match points {
                 None => add(at, 0, force),
                 Some(points) => points.add_force(state, at as usize, force, &mut |node, force, moment| {
@@ -60,12 +60,12 @@ impl System {
                 }
                 LoadKind::ShellPressure { facets, pressure, spread } => {
                     for &facet in facets {
-                        let own = &mut on_facets[facet as usize];
-                        let own = match spread {
-                            Spread::Lumped => &mut own.lumped,
-                            Spread::Curved => &mut own.curved,
+                        let of_facet = &mut on_facets[facet as usize];
+                        let pressures = match spread {
+                            Spread::Lumped => &mut of_facet.lumped,
+                            Spread::Curved => &mut of_facet.curved,
                         };
-                        own[usize::from(load.controlled)] += factor * pressure;
+                        pressures[usize::from(load.controlled)] += factor * pressure;
                     }
                 }
             }
@@ -79,12 +79,12 @@ impl System {
         }
         let Self { model, facets, forces, stiffness, followers, conditions, .. } = self;
         let resisting = |at: usize| forces.resisting(at, state.load_factor);
-        let all = conditions.pressures(model, &stiffness.equations, resisting);
+        let pressures = conditions.pressures(model, &stiffness.equations, resisting);
         let symmetric = stiffness.is_symmetric();
         let mut sums = Sums { forces, stiffness, followers: followers.as_ref() };
-        for (own, enclosure, pressure) in all {
+        for (constraint, enclosure, pressure) in pressures {
             for face in &enclosure.faces {
-                let face = face.map(|at| if at == NO_NODE { at } else { own.nodes[at as usize] });
+                let face = face.map(|at| if at == NO_NODE { at } else { constraint.nodes[at as usize] });
                 let Stiffness { equations, matrix, .. } = &*sums.stiffness;
                 let places = matrix.places(equations, corners(&face), 3);
                 press_face(&face, &places, -pressure, state, moved, &mut sums);
@@ -100,8 +100,8 @@ impl System {
                     let forces = patch.pressure_forces() * pressure;
                     for first in [3, 9, 15] {
                         let moment = Vector3::new(forces[first], forces[first + 1], forces[first + 2]);
-                        let mut own = tangent.fixed_view_mut::<3, 3>(first, first);
-                        own -= skew(&moment) * 0.5;
+                        let mut block = tangent.fixed_view_mut::<3, 3>(first, first);
+                        block -= skew(&moment) * 0.5;
                     }
                 }
                 let (nodes, places) = (&model.facets[facet as usize].nodes, facets.places_of(facet));
@@ -118,26 +118,27 @@ impl System {
         constraint: usize,
         state: &AssemblyState,
     ) -> Option<(Enclosed, Vec<(usize, f64)>)> {
-        let own = &self.model.constraints[constraint];
-        let Motion::Volume { enclosure, .. } = &own.motion else { return None };
-        let mut all: Vec<(usize, f64)> = Vec::new();
+        let enclosing = &self.model.constraints[constraint];
+        let Motion::Volume { enclosure, .. } = &enclosing.motion else { return None };
+        let mut gradient: Vec<(usize, f64)> = Vec::new();
         let surface = self.facets.surface.as_ref();
-        let volume = add_gradient(&self.model, surface, own, enclosure, state, &mut |component, value| {
-            if self.stiffness.equations.number[component] != NONE {
-                all.push((component, value));
-            }
-        });
+        let volume =
+            add_gradient(&self.model, surface, enclosing, enclosure, state, &mut |component, value| {
+                if self.stiffness.equations.number[component] != NONE {
+                    gradient.push((component, value));
+                }
+            });
         // Entries of one component together.
-        all.sort_by_key(|&(component, _)| component);
-        all.dedup_by(|next, own| {
-            let same = next.0 == own.0;
-            own.1 += if same { next.1 } else { 0.0 };
+        gradient.sort_by_key(|&(component, _)| component);
+        gradient.dedup_by(|next, kept| {
+            let same = next.0 == kept.0;
+            kept.1 += if same { next.1 } else { 0.0 };
             same
         });
         let along = |&(at, g): &(usize, f64)| g * (self.forces.internal[at] - self.forces.external[at]);
-        let squared: f64 = all.iter().map(|(_, g)| g * g).sum();
-        let pressure = all.iter().map(along).sum::<f64>() / squared;
-        all.iter_mut().for_each(|(_, g)| *g *= pressure);
-        Some((Enclosed { volume, pressure }, all))
+        let squared: f64 = gradient.iter().map(|(_, g)| g * g).sum();
+        let pressure = gradient.iter().map(along).sum::<f64>() / squared;
+        gradient.iter_mut().for_each(|(_, g)| *g *= pressure);
+        Some((Enclosed { volume, pressure }, gradient))
     }
 }

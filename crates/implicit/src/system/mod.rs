@@ -150,7 +150,8 @@ impl System {
         let equations = &system.stiffness.equations;
         system.followers = Followers::of(&model, true);
         system.conditions = Conditions::of(&model, equations, system.facets.surface.as_ref());
-        system.contact = model.contact.as_ref().map(|own| Box::new(ContactSystem::new(own, &model)));
+        system.contact =
+            model.contact.as_ref().map(|contacts| Box::new(ContactSystem::new(contacts, &model)));
         system.lags = model.force_limits.keys().map(|&constraint| Lag::new(constraint as u32)).collect();
         system.stiffness.coupling = vec![0.0; equations.count()];
         (system.stiffness.solver, system.stiffness.device) = (solver, device);
@@ -332,13 +333,13 @@ impl System {
                 |node: u32| Vector3::from_fn(|c, _| forces.resisting(6 * node as usize + 3 + c, load_factor));
             followers.add_turns(equations, matrix, moment, |_| 0.0);
         }
-        forces.all().into_iter().for_each(|own| followers.give_moments_back(own));
+        forces.kinds().into_iter().for_each(|components| followers.give_moments_back(components));
         if tangent {
             let force =
                 |node: u32| Vector3::from_fn(|c, _| forces.resisting(6 * node as usize + c, load_factor));
             followers.add_parts(equations, matrix, |node| (0.0, force(node)), |_| 0.0);
         }
-        forces.all().into_iter().for_each(|own| followers.give_back(own));
+        forces.kinds().into_iter().for_each(|components| followers.give_back(components));
     }
 
     /// Adds contacts; the time that their stiffness took.
@@ -390,8 +391,8 @@ impl System {
     /// another one [s].
     pub(crate) fn catch_up(&mut self, state: &AssemblyState, until: f64) {
         let lag = |number: usize| {
-            let own = self.lags.iter().find(|lag| lag.number() == number);
-            own.map_or_else(Vector3::zeros, Lag::now)
+            let found = self.lags.iter().find(|lag| lag.number() == number);
+            found.map_or_else(Vector3::zeros, Lag::now)
         };
         self.gap = Gap::of(&self.model, state, until, lag);
     }

@@ -34,12 +34,12 @@ impl NodalForces {
     }
 
     pub(super) fn clear(&mut self) {
-        self.all().into_iter().for_each(|forces| forces.fill(0.0));
+        self.kinds().into_iter().for_each(|forces| forces.fill(0.0));
         (self.energy, self.hourglass, self.largest) = (0.0, 0.0, 0.0);
     }
 
     /// Internal forces, and fixed and controlled loads.
-    pub(super) fn all(&mut self) -> [&mut [f64]; 3] {
+    pub(super) fn kinds(&mut self) -> [&mut [f64]; 3] {
         [&mut self.internal, &mut self.external, &mut self.controlled]
     }
 
@@ -68,8 +68,8 @@ impl NodalForces {
     /// Adds forces of a cell of a solid on its nodes.
     pub(super) fn add_cell(&mut self, nodes: &[u32], forces: &[f64]) {
         for (&node, force) in nodes.iter().zip(forces.chunks_exact(3)) {
-            for (own, force) in self.internal[6 * node as usize..].iter_mut().zip(force) {
-                *own += force;
+            for (sum, force) in self.internal[6 * node as usize..].iter_mut().zip(force) {
+                *sum += force;
                 self.largest = self.largest.max(force.abs());
             }
         }
@@ -88,8 +88,8 @@ impl NodalForces {
             (0..3).for_each(|c| self.external[at + c] -= spring.stiffness * stretch[c]);
         }
         for (node, force) in &self.pushed {
-            let own = &mut self.external[6 * *node as usize..];
-            own.iter_mut().zip(force).for_each(|(own, force)| *own += force);
+            let on_node = &mut self.external[6 * *node as usize..];
+            on_node.iter_mut().zip(force).for_each(|(entry, force)| *entry += force);
         }
     }
 }

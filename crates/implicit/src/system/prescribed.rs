@@ -34,8 +34,8 @@ impl Gap {
         let by = missing(model, state, lag);
         let edge = model.mean_edge();
         let arrived = |(at, gap): (usize, &f64)| gap.abs() <= ARRIVED * if at % 6 < 3 { edge } else { 1.0 };
-        let all = by.iter().enumerate().all(arrived);
-        (!all).then_some(Self { by, times: [state.time, until] })
+        let closed = by.iter().enumerate().all(arrived);
+        (!closed).then_some(Self { by, times: [state.time, until] })
     }
 
     /// Adds the part of the gap that comes in between two times [s] to increments, six a node.
@@ -43,7 +43,7 @@ impl Gap {
         let [begin, end] = self.times;
         let part = ((to.min(end) - from.max(begin)) / (end - begin)).max(0.0);
         if part > 0.0 {
-            increments.iter_mut().zip(&self.by).for_each(|(own, by)| *own += part * by);
+            increments.iter_mut().zip(&self.by).for_each(|(entry, by)| *entry += part * by);
         }
     }
 }
@@ -56,11 +56,12 @@ impl Assembly {
         let gap = missing(self, state, |_| Vector3::zeros());
         state.advance(&gap, 1.0);
         let held = self.held_components();
-        for own in &self.constraints {
-            let missing = own.missing_mean(state.time, |node| self.displacement(&state.position, node));
-            own.nodes.iter().for_each(|&node| state.position[node as usize] += Vector3::from(missing));
-            if let Motion::Volume { enclosure, by, curve } = &own.motion {
-                self.fill(own, enclosure, by * curve.value(state.time), &held, state);
+        for constraint in &self.constraints {
+            let missing =
+                constraint.missing_mean(state.time, |node| self.displacement(&state.position, node));
+            constraint.nodes.iter().for_each(|&node| state.position[node as usize] += Vector3::from(missing));
+            if let Motion::Volume { enclosure, by, curve } = &constraint.motion {
+                self.fill(constraint, enclosure, by * curve.value(state.time), &held, state);
             }
         }
         self.take_along(state);
@@ -70,7 +71,7 @@ impl Assembly {
     /// gradient of the volume.
     fn fill(
         &self,
-        own: &Constraint,
+        constraint: &Constraint,
         enclosure: &Enclosure,
         growth: f64,
         held: &[bool],
@@ -79,7 +80,7 @@ impl Assembly {
         let surface = (!enclosure.facets.is_empty()).then(|| CurvedSurface::new(self, EdgeRule::Arc));
         let volume = |state: &AssemblyState, gradient: &mut [f64]| {
             gradient.fill(0.0);
-            add_gradient(self, surface.as_ref(), own, enclosure, state, &mut |at, value| {
+            add_gradient(self, surface.as_ref(), constraint, enclosure, state, &mut |at, value| {
                 if at % 6 < 3 && !held[at] {
                     gradient[at] += value;
                 }
@@ -93,10 +94,10 @@ impl Assembly {
     /// Flags of the components that a constraint fixes or moves by itself, six a node.
     pub fn held_components(&self) -> Vec<bool> {
         let mut held = vec![false; 6 * self.rest.len()];
-        for own in self.constraints.iter().filter(|own| !own.motion.is_collective()) {
-            for &node in &own.nodes {
+        for constraint in self.constraints.iter().filter(|constraint| !constraint.motion.is_collective()) {
+            for &node in &constraint.nodes {
                 let components = &mut held[6 * node as usize..6 * node as usize + 6];
-                components.iter_mut().zip(own.components).for_each(|(held, own)| *held |= own);
+                components.iter_mut().zip(constraint.components).for_each(|(held, holds)| *held |= holds);
             }
         }
         held
@@ -108,28 +109,28 @@ impl Assembly {
 /// of a constraint lag behind it. Nodes that are fixed stay where they start. Rotations about some axes only
 /// are not followed beyond rest.
 fn missing(model: &Assembly, state: &AssemblyState, lag: impl Fn(usize) -> Vector3<f64>) -> Vec<f64> {
-    let mut all = vec![0.0; 6 * model.rest.len()];
-    for (number, own) in model.constraints.iter().enumerate() {
-        if matches!(own.motion, Motion::Fixed) || own.motion.is_collective() {
+    let mut gaps = vec![0.0; 6 * model.rest.len()];
+    for (number, constraint) in model.constraints.iter().enumerate() {
+        if matches!(constraint.motion, Motion::Fixed) || constraint.motion.is_collective() {
             continue;
         }
         let lag = lag(number);
-        for (index, &node) in own.nodes.iter().enumerate() {
-            let place = own.motion.place(index, state.time);
+        for (index, &node) in constraint.nodes.iter().enumerate() {
+            let place = constraint.motion.place(index, state.time);
             let [shift, turn] =
                 [0, 3].map(|first| Vector3::new(place[first], place[first + 1], place[first + 2]));
             let shift = shift + lag - Vector3::from(model.displacement(&state.position, node));
             let rotation = &state.rotation[node as usize];
-            let turn = match own.components[3..] {
+            let turn = match constraint.components[3..] {
                 // At rest all turns begin, whole ones and more included.
                 _ if rotation.angle() == 0.0 => turn,
                 [true, true, true] => logarithm(&(exponential(&turn) * rotation.inverse())),
                 _ => Vector3::zeros(),
             };
-            for c in (0..6).filter(|&c| own.components[c]) {
-                all[6 * node as usize + c] = if c < 3 { shift[c] } else { turn[c - 3] };
+            for c in (0..6).filter(|&c| constraint.components[c]) {
+                gaps[6 * node as usize + c] = if c < 3 { shift[c] } else { turn[c - 3] };
             }
         }
     }
-    all
+    gaps
 }

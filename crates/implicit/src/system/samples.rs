@@ -107,12 +107,12 @@ impl Samples {
                     continue;
                 };
                 // The corners of the face may be in another order than in its facet.
-                let own = model.facets[facet as usize].nodes;
+                let corners = model.facets[facet as usize].nodes;
                 let mut at = |i: u32, j: u32| {
                     let of_face = [n - i - j, i, j];
-                    let parts = own
+                    let parts = corners
                         .map(|node| face.iter().position(|&corner| corner == node).map_or(0, |k| of_face[k]));
-                    numbers.at(facet, own, parts, n)
+                    numbers.at(facet, corners, parts, n)
                 };
                 for j in 0..n {
                     for i in 0..n - j {
@@ -135,12 +135,12 @@ impl Samples {
             };
             Contact { surface: divided(&contact.surface, level), with, ..contact.clone() }
         };
-        let all =
+        let divided_contacts =
             contacts.contacts.iter().zip(levels).map(|(contact, &level)| of(contact, level, &mut divided));
-        let sampled = Contacts { contacts: all.collect(), ..contacts.clone() };
+        let sampled = Contacts { contacts: divided_contacts.collect(), ..contacts.clone() };
         let points = numbers.points;
         let state = AssemblyState::at_rest(model);
-        let mut own = Self {
+        let mut samples = Self {
             surface: CurvedSurface::new(model, EdgeRule::Arc),
             jacobians: vec![SMatrix::zeros(); points.len()],
             motion: vec![0.0; 6 * (model.rest.len() + points.len())],
@@ -149,8 +149,8 @@ impl Samples {
             tried: state.clone(),
             nodes: model.rest.len(),
         };
-        own.place(model, &state);
-        Some((own, sampled))
+        samples.place(model, &state);
+        Some((samples, sampled))
     }
 
     /// Finds places and J at a state.
@@ -219,19 +219,21 @@ impl Samples {
     }
 
     /// Adds the forces on points, six numbers each from the first node on, to the forces on nodes by Jᵀ.
-    pub(crate) fn give_back(&self, model: &Assembly, all: &[f64], forces: &mut [f64]) {
-        forces.copy_from_slice(&all[..forces.len()]);
+    pub(crate) fn give_back(&self, model: &Assembly, point_forces: &[f64], forces: &mut [f64]) {
+        forces.copy_from_slice(&point_forces[..forces.len()]);
         for (at, point) in self.points.iter().enumerate() {
-            let force = Vector3::from_column_slice(&all[forces.len() + 6 * at..forces.len() + 6 * at + 3]);
+            let force =
+                Vector3::from_column_slice(&point_forces[forces.len() + 6 * at..forces.len() + 6 * at + 3]);
             if force == Vector3::zeros() {
                 continue;
             }
             let back = self.jacobians[at].tr_mul(&force);
             for (corner, &node) in model.facets[point.facet as usize].nodes.iter().enumerate() {
-                let own = &mut forces[6 * node as usize..6 * node as usize + 6];
-                own.iter_mut()
+                let on_node = &mut forces[6 * node as usize..6 * node as usize + 6];
+                on_node
+                    .iter_mut()
                     .zip(back.fixed_rows::<6>(6 * corner).iter())
-                    .for_each(|(own, back)| *own += back);
+                    .for_each(|(entry, back)| *entry += back);
             }
         }
     }
@@ -313,8 +315,9 @@ impl Movers<'_> {
             for (row_node, row, by_row) in &movers {
                 for (column_node, column, by_column) in &movers {
                     if row_node >= column_node {
-                        let own = by_row.transpose() * part(*row, *column) * by_column;
-                        matrix.add_node_block(equations, [*row_node, *column_node], 6, |i, j| own[(i, j)]);
+                        let entries = by_row.transpose() * part(*row, *column) * by_column;
+                        matrix
+                            .add_node_block(equations, [*row_node, *column_node], 6, |i, j| entries[(i, j)]);
                     }
                 }
             }
@@ -327,10 +330,10 @@ impl Movers<'_> {
             }
             for (node, row, by) in &movers {
                 let pull: Vector3<f64> = (0..count).map(|column| part(*row, column) * ways[column]).sum();
-                for (c, own) in by.tr_mul(&pull).iter().enumerate() {
+                for (c, value) in by.tr_mul(&pull).iter().enumerate() {
                     let equation = equations.number[6 * *node as usize + c];
                     if let Some(coupling) = coupling.get_mut(equation as usize) {
-                        *coupling += own;
+                        *coupling += value;
                     }
                 }
             }

@@ -98,7 +98,7 @@ impl Solids {
                 let lag = relaxation.of_cell(index, solid, first + at);
                 result.fill(solid, first + at, pressure, lag, displacement, moved.is_some());
             });
-            let broken = (first..last).zip(&*results).find_map(|(cell, own)| Some((cell, own.broken?)));
+            let broken = (first..last).zip(&*results).find_map(|(cell, result)| Some((cell, result.broken?)));
             if let Some((cell, why)) = broken {
                 return Err(SolveError::Broken { cell, why });
             }

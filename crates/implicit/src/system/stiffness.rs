@@ -100,9 +100,9 @@ impl Stiffness {
     ) {
         let expanded = followers.and_then(|followers| followers.expanded(nodes, false));
         match (expanded, followers) {
-            (Some(own), Some(followers)) => {
-                let whole = followers.condensed(nodes, 3, &own, tangent);
-                self.add_block((&own.0, own.1), places, &whole, moved);
+            (Some(expanded), Some(followers)) => {
+                let whole = followers.condensed(nodes, 3, &expanded, tangent);
+                self.add_block((&expanded.0, expanded.1), places, &whole, moved);
             }
             _ => self.add_block((nodes, 3), places, tangent, moved),
         }
@@ -136,8 +136,8 @@ impl Stiffness {
 
     /// Adds the stiffness of a spring.
     pub(super) fn add_spring(&mut self, followers: Option<&Followers>, spring: &Spring) {
-        let own = followers.and_then(|own| own.spring(spring.node, spring.stiffness));
-        if let Some(((nodes, components), stiffness)) = own {
+        let followed = followers.and_then(|followers| followers.spring(spring.node, spring.stiffness));
+        if let Some(((nodes, components), stiffness)) = followed {
             let places = self.matrix.places(&self.equations, &nodes, components);
             let cell = Cell { nodes: &nodes, components, places: &places, entries: &stiffness };
             self.matrix.add(&self.equations, &cell);

@@ -89,8 +89,8 @@ impl Turn {
                 let stretched = Vector3::ith(axis, 1.0) * moving.transpose() - self.stretch * skew(&spin);
                 let grown = Matrix3::from_diagonal_element(stretched.trace()) - stretched;
                 let turned = -self.inverse * grown * y;
-                for (row, ((_, _, r), own)) in self.rows.iter().zip(&blocks).enumerate() {
-                    let change = turned.cross(r) + y.cross(&spin.cross(r)) + rotary * own.tr_mul(&spin);
+                for (row, ((_, _, r), row_block)) in self.rows.iter().zip(&blocks).enumerate() {
+                    let change = turned.cross(r) + y.cross(&spin.cross(r)) + rotary * row_block.tr_mul(&spin);
                     for k in 0..3 {
                         whole[(3 * column + axis) * size + 3 * row + k] = change[k];
                     }

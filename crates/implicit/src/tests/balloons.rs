@@ -276,8 +276,8 @@ pub(super) fn a_taut_membrane_rises_as_by_poisson() {
         model.add_shell(&shell).unwrap();
         let rim = |n: &u32| [n % row, n / row].iter().any(|&i| i == 0 || i == cells);
         model.model_mut().constraints.push(fix((0..row * row).filter(rim).collect(), [true; 6]));
-        let all = (0..model.facets.len() as u32).collect();
-        let kind = LoadKind::ShellPressure { facets: all, pressure, spread: Spread::Lumped };
+        let every_facet = (0..model.facets.len() as u32).collect();
+        let kind = LoadKind::ShellPressure { facets: every_facet, pressure, spread: Spread::Lumped };
         model.model_mut().loads.push(Load::new("pressure", kind, ramp()));
         let mut state = AssemblyState::at_rest(&model);
         Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();

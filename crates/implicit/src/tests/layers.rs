@@ -47,10 +47,10 @@ pub(super) fn timoshenko_two_layer_strip_stretches_as_it_bends() {
     }
     // Heights of the layers' middles and of the neutral axis above the middle surface; width 2, length 8.
     let neutral: f64 = 0.025 * (4.0 - 1.0) / (4.0 + 1.0);
-    let own = 2.0 * 0.05_f64.powi(3) / 12.0;
+    let inertia = 2.0 * 0.05_f64.powi(3) / 12.0;
     let area = 2.0 * 0.05;
-    let rigidity =
-        1e6 * (own + area * (0.025 + neutral).powi(2)) + 4e6 * (own + area * (0.025 - neutral).powi(2));
+    let rigidity = 1e6 * (inertia + area * (0.025 + neutral).powi(2))
+        + 4e6 * (inertia + area * (0.025 - neutral).powi(2));
     let curvature = moment / rigidity;
     let mut state = AssemblyState::at_rest(&model);
     Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
@@ -116,7 +116,7 @@ pub(super) fn layers_pass_the_patch_test() {
         }
         let mut forces = Forces::new(model.clone());
         forces.evaluate(&state).unwrap();
-        let largest = forces.internal().iter().fold(0.0_f64, |all, force| all.max(force.abs()));
+        let largest = forces.internal().iter().fold(0.0_f64, |most, force| most.max(force.abs()));
         for node in 10..16 {
             for force in &forces.internal()[6 * node..6 * node + 6] {
                 // Rotations of 1e-5 against each other: linear theory to about that.

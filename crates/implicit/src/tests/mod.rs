@@ -134,12 +134,12 @@ fn triangles_are_turned_to_one_side_and_counted() {
     let mut model = Assembly::new("shell", points);
     let notes = model.add_shell(&Shell::new("ball", cells, 0.01, MATERIAL)).unwrap();
     assert_eq!(notes, Notes { turned: 3, ..Notes::default() });
-    let all: Vec<u32> = (0..128).collect();
+    let triangles: Vec<u32> = (0..128).collect();
     // Of an inscribed polyhedron of 128 faces.
-    let volume = model.rest_volume(&all);
+    let volume = model.rest_volume(&triangles);
     assert!((3.7..4.19).contains(&volume), "{volume}");
-    assert!(model.check_closed(&all).is_ok());
-    let Err(ModelError::Open { loops }) = model.check_closed(&all[1..127]) else { panic!("closed") };
+    assert!(model.check_closed(&triangles).is_ok());
+    let Err(ModelError::Open { loops }) = model.check_closed(&triangles[1..127]) else { panic!("closed") };
     assert_eq!(loops.iter().map(Vec::len).collect::<Vec<_>>(), [3, 3]);
 }
 
@@ -274,13 +274,13 @@ fn the_assembled_stiffness_is_the_derivative_of_the_forces() {
         let mut moved = state.clone();
         moved.advance(&increment, h);
         system.evaluate(&moved, 0.0, None).unwrap();
-        let all: Vec<f64> = (0..6 * model.rest.len())
+        let residuals: Vec<f64> = (0..6 * model.rest.len())
             .map(|c| {
                 system.forces.internal[c] - system.forces.external[c] - 2.0 * system.forces.controlled[c]
             })
             .collect();
         let mut free = vec![0.0; size];
-        system.gather(&all, &mut free);
+        system.gather(&residuals, &mut free);
         free
     };
     let h = 1e-6;

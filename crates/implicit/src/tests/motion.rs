@@ -248,8 +248,8 @@ fn a_free_body_keeps_its_momentum() {
     let momentum = |state: &AssemblyState| {
         let nodes = 0..model.rest.len();
         nodes.fold((Vector3::zeros(), Vector3::zeros()), |(p, l), i| {
-            let own = model.mass[i] * state.velocity[i];
-            (p + own, l + state.position[i].cross(&own) + model.rotary_inertia[i] * state.spin[i])
+            let linear = model.mass[i] * state.velocity[i];
+            (p + linear, l + state.position[i].cross(&linear) + model.rotary_inertia[i] * state.spin[i])
         })
     };
     let settings = DynamicSettings { tolerance: 1e-10, ..DynamicSettings::new(2e-3) };

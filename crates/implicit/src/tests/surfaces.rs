@@ -51,10 +51,10 @@ fn a_closed_surface_has_no_resultant_and_a_symmetric_change() {
     let mut change = nalgebra::DMatrix::<f64>::zeros(size, size);
     for (number, facet) in model.facets.iter().enumerate() {
         let patch = surface.patch(&model, &state, number as u32);
-        let (own, moved) = (patch.pressure_forces(), patch.pressure_change());
+        let (pushed, moved) = (patch.pressure_forces(), patch.pressure_change());
         let place = |i: usize| 6 * facet.nodes[i / 6] as usize + i % 6;
         for i in 0..18 {
-            forces[place(i)] += own[i];
+            forces[place(i)] += pushed[i];
             (0..18).for_each(|j| change[(place(i), place(j))] += moved[(i, j)]);
         }
     }
@@ -64,8 +64,8 @@ fn a_closed_surface_has_no_resultant_and_a_symmetric_change() {
     for node in 0..model.rest.len() {
         force += part(node, 0);
         moment += state.position[node].cross(&part(node, 0)) + part(node, 3);
-        let mut own = change.fixed_view_mut::<3, 3>(6 * node + 3, 6 * node + 3);
-        own += 0.5 * skew(&part(node, 3));
+        let mut block = change.fixed_view_mut::<3, 3>(6 * node + 3, 6 * node + 3);
+        block += 0.5 * skew(&part(node, 3));
     }
     assert!(force.norm() < 1e-12 && moment.norm() < 1e-12, "{force} {moment}");
     let off = (&change - change.transpose()).amax() / change.amax();

@@ -53,9 +53,9 @@ fn least_friction() -> f64 {
         needed
     };
     let thrusts = (1..=800).map(|k| f64::from(k) * 0.005);
-    let all =
+    let candidates =
         thrusts.flat_map(|thrust| (0..=100).map(move |k| (thrust, low + (high - low) * 0.01 * f64::from(k))));
-    all.map(|(thrust, place)| needed(thrust, place)).fold(f64::INFINITY, f64::min)
+    candidates.map(|(thrust, place)| needed(thrust, place)).fold(f64::INFINITY, f64::min)
 }
 
 /// Distance [m] that the crown has come down after 0.4 s.
@@ -81,15 +81,15 @@ fn sunk(friction: f64) -> f64 {
         surfaces.push(surface(body.faces));
     }
     let settings = Touch { friction, offset: 0.0 };
-    let contact = |own: usize, with| Contact {
+    let contact = |block: usize, with| Contact {
         name: "joint".into(),
-        surface: surfaces[own].clone(),
+        surface: surfaces[block].clone(),
         with,
         touch: settings,
     };
     let mut contacts: Vec<Contact> =
-        (1..BLOCKS).map(|own| contact(own, With::Body(surfaces[own - 1].clone()))).collect();
-    contacts.extend([0, BLOCKS - 1].map(|own| contact(own, With::Rigid(0))));
+        (1..BLOCKS).map(|block| contact(block, With::Body(surfaces[block - 1].clone()))).collect();
+    contacts.extend([0, BLOCKS - 1].map(|block| contact(block, With::Rigid(0))));
     let floor = fixed("floor", Shape::HalfSpace, [0.0, 0.0, -0.5 * GAP], [0.0; 3]);
     let barrier = BarrierSettings { distance: GAP, stiffness: 1e5, creep_speed: 1e-3 };
     touch(&mut model, Contacts { rigids: vec![floor], contacts, ..Default::default() }, barrier);

@@ -58,8 +58,8 @@ fn gap_under(pressure: f64) -> f64 {
     let [mut low, mut high] = [1e-9, 1.0];
     for _ in 0..80 {
         let y: f64 = 0.5 * (low + high);
-        let own = 2.0 * (y - 1.0) * y.ln() + (y - 1.0).powi(2) / y;
-        if own > pressure { low = y } else { high = y }
+        let reached = 2.0 * (y - 1.0) * y.ln() + (y - 1.0).powi(2) / y;
+        if reached > pressure { low = y } else { high = y }
     }
     0.5 * (low + high)
 }
@@ -109,13 +109,13 @@ fn a_uniform_pressure_goes_through_cells_that_do_not_match() {
     let (mut off, mut most, mut volume) = (0.0, 0.0_f64, 0.0);
     for solid in &model.solids {
         for cell in 0..solid.cells.len() {
-            let (stress, own) = stress(&model, &state, solid.cells.nodes(cell));
+            let (stress, size) = stress(&model, &state, solid.cells.nodes(cell));
             let beside = (stress[(2, 2)] / -pressure - 1.0).abs();
-            (off, volume, most) = (off + own * beside, volume + own, most.max(beside));
+            (off, volume, most) = (off + size * beside, volume + size, most.max(beside));
         }
     }
     let exact = barrier * gap_under(pressure / stiffness);
-    let gaps = now.nodes.iter().map(|own| own.gap / exact);
+    let gaps = now.nodes.iter().map(|node| node.gap / exact);
     let [least, largest] = [f64::min, f64::max].map(|of| gaps.clone().reduce(of).unwrap());
     let mean = gaps.sum::<f64>() / now.nodes.len() as f64;
     println!(
@@ -133,11 +133,14 @@ fn a_uniform_pressure_goes_through_cells_that_do_not_match() {
     let numbers = contacts.nodes();
     let places: Vec<Vector3<f64>> = numbers.iter().map(|&node| state.position[node as usize]).collect();
     let push = |node: &u32| {
-        now.nodes.iter().find(|own| own.node == *node).map_or_else(Vector3::zeros, |own| own.push.into())
+        now.nodes
+            .iter()
+            .find(|known| known.node == *node)
+            .map_or_else(Vector3::zeros, |known| known.push.into())
     };
     let pushes: Vec<Vector3<f64>> = numbers.iter().map(push).collect();
     let found = pressures(&faces(contacts, &numbers), &pushes, &places);
-    let found: Vec<f64> = found.into_iter().flatten().map(|own| own / pressure).collect();
+    let found: Vec<f64> = found.into_iter().flatten().map(|value| value / pressure).collect();
     let [least, largest] = [f64::min, f64::max].map(|of| found.iter().copied().reduce(of).unwrap());
     let mean = found.iter().sum::<f64>() / found.len() as f64;
     println!("pressures of nodes {least:.4} to {largest:.4}, in the mean {mean:.4}");

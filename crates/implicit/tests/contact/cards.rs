@@ -43,9 +43,9 @@ fn sunk(friction: f64) -> f64 {
         surfaces.push(surface(body.faces));
     }
     let settings = Touch { friction, offset: 0.0 };
-    let contact = |own: usize, with| Contact {
+    let contact = |card: usize, with| Contact {
         name: "touch".into(),
-        surface: surfaces[own].clone(),
+        surface: surfaces[card].clone(),
         with,
         touch: settings,
     };

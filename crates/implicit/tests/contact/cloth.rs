@@ -46,14 +46,14 @@ fn cloth(cells: u32, friction: f64) -> Assembly {
     let curve = Curve { shape: CurveShape::Hold, from: 0.0, to: 1.0 };
     let kind = LoadKind::Gravity { body: 0, acceleration: [0.0, 0.0, -9.81] };
     model.model_mut().loads.push(Load::new("weight", kind, curve));
-    let own = surface(faces);
+    let cloth_surface = surface(faces);
     let radius = 0.08;
     let ball = fixed("ball", Shape::Sphere { radius }, [0.003, 0.002, -radius - 2e-3], [0.0; 3]);
-    let mut contacts = at_rigid(&own, vec![ball], friction, 0.5 * thickness);
+    let mut contacts = at_rigid(&cloth_surface, vec![ball], friction, 0.5 * thickness);
     let own_touch = Touch { friction, offset: thickness };
     contacts.contacts.push(Contact {
         name: "itself".into(),
-        surface: own,
+        surface: cloth_surface,
         with: With::Itself,
         touch: own_touch,
     });
@@ -181,9 +181,9 @@ fn a_twisted_strip_does_not_go_through_itself() {
         let constraint = Constraint { name: name.into(), nodes, components, motion };
         model.model_mut().constraints.push(constraint);
     }
-    let own = surface(faces);
+    let strip = surface(faces);
     let own_touch = Touch { friction: 0.2, offset: thickness };
-    let contact = Contact { name: "itself".into(), surface: own, with: With::Itself, touch: own_touch };
+    let contact = Contact { name: "itself".into(), surface: strip, with: With::Itself, touch: own_touch };
     let contacts =
         pliant_contact::touch::Contacts { rigids: Vec::new(), contacts: vec![contact], ..Default::default() };
     touch(

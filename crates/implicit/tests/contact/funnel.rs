@@ -40,7 +40,7 @@ fn a_ball_goes_through_a_narrow_tube_and_is_round_again() {
     let is_outer = |node: u32| (Vector3::from(points[node as usize]).norm() - RADIUS).abs() < 1e-9;
     let sides = hexes.iter().flat_map(|hex| SIDES.map(|side| side.map(|k| hex[k])));
     let outer = sides.filter(|side| side.iter().all(|&node| is_outer(node)));
-    let own = surface(outer.flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect());
+    let skin = surface(outer.flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect());
     let corners = [
         ([-0.1, 0.03], 0.0),
         ([-0.045, 0.03], 0.002),
@@ -55,7 +55,7 @@ fn a_ball_goes_through_a_narrow_tube_and_is_round_again() {
     let ramp = Curve { shape: CurveShape::Ramp, from: 0.0, to: 0.7 };
     let plunger = rigid("plunger", Shape::HalfSpace, Trajectory::by(upside_down, [0.0, 0.0, -0.07], ramp));
     let barrier = BarrierSettings { distance: 1e-4, stiffness: 0.1 * YOUNG, creep_speed: 1e-3 };
-    touch(&mut model, at_rigid(&own, vec![funnel, plunger], 0.1, 0.0), barrier);
+    touch(&mut model, at_rigid(&skin, vec![funnel, plunger], 0.1, 0.0), barrier);
     let settings = DynamicSettings { iterations: 200, ..DynamicSettings::new(0.01) };
     let mut solver = BackwardEuler::new(model.clone(), settings).unwrap();
     let mut state = AssemblyState::at_rest(&model);
@@ -68,7 +68,7 @@ fn a_ball_goes_through_a_narrow_tube_and_is_round_again() {
         let change = edges.map(|[a, b]| {
             (state.position[a] - state.position[b]).norm() / (model.place(a) - model.place(b)).norm() - 1.0
         });
-        change.fold(0.0_f64, |most, own| most.max(own.abs()))
+        change.fold(0.0_f64, |most, strain| most.max(strain.abs()))
     };
     let (mut most, mut iterations, mut halved, mut least) = (0.0_f64, 0, 0, f64::INFINITY);
     while state.time < 1.0 - 1e-9 {

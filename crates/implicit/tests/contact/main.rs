@@ -40,10 +40,10 @@ fn surface(faces: Vec<[u32; 3]>) -> Surface {
 }
 
 /// Contacts of a surface with rigid things, each at a distance that is kept [m].
-fn at_rigid(own: &Surface, rigids: Vec<Rigid>, friction: f64, offset: f64) -> Contacts {
+fn at_rigid(surface: &Surface, rigids: Vec<Rigid>, friction: f64, offset: f64) -> Contacts {
     let contacts = (0..rigids.len()).map(|number| Contact {
         name: rigids[number].name.clone(),
-        surface: own.clone(),
+        surface: surface.clone(),
         with: With::Rigid(number),
         touch: Touch { friction, offset },
     });

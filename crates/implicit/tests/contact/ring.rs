@@ -38,11 +38,11 @@ fn ring(edges: u32, thickness: f64) -> (Assembly, Surface, f64) {
             [[a, b, c], [a, c, d]]
         })
         .collect();
-    let own = surface(cells.clone());
+    let skin = surface(cells.clone());
     let material = Wall { elastic: Elasticity { young: YOUNG, poisson: POISSON }, density: 1000.0 };
     let mut model = Assembly::new("ring", points);
     model.add_shell(&Shell::new("ring", cells, thickness, material)).unwrap();
-    (model, own, width)
+    (model, skin, width)
 }
 
 fn prescribe(model: &mut Assembly, name: &str, nodes: Vec<u32>, components: [bool; 6]) {
@@ -53,7 +53,7 @@ fn prescribe(model: &mut Assembly, name: &str, nodes: Vec<u32>, components: [boo
 /// Force [E I/R² times the width] and approach [R] of the mid-surface between two plates that come nearer in
 /// load steps.
 fn pressed(edges: u32, thickness: f64, approach: f64, steps: u32) -> Vec<[f64; 2]> {
-    let (mut model, own, width) = ring(edges, thickness);
+    let (mut model, skin, width) = ring(edges, thickness);
     // Plane strain; the nodes at the sides stay at their height.
     prescribe(&mut model, "plane", (0..2 * edges).collect(), [false, true, false, true, false, true]);
     let quarter = edges / 4;
@@ -70,7 +70,7 @@ fn pressed(edges: u32, thickness: f64, approach: f64, steps: u32) -> Vec<[f64; 2
         let start = Pose::new(Vector3::z() * (up * reach), turn);
         rigid(name, Shape::HalfSpace, Trajectory::by(start, [0.0, 0.0, -up * way], ramp.clone()))
     };
-    let contacts = at_rigid(&own, vec![plate("upper", 1.0), plate("lower", -1.0)], 0.0, 0.5 * thickness);
+    let contacts = at_rigid(&skin, vec![plate("upper", 1.0), plate("lower", -1.0)], 0.0, 0.5 * thickness);
     touch(
         &mut model,
         contacts,
@@ -100,18 +100,21 @@ fn pressed(edges: u32, thickness: f64, approach: f64, steps: u32) -> Vec<[f64; 2
 /// The force at an approach, of the elastica reference.
 fn reference(approach: f64) -> f64 {
     let text = include_str!("../../../../lab/validation/data/coupling/elastica_contact.json");
-    let all: serde_json::Value = serde_json::from_str(text).unwrap();
+    let document: serde_json::Value = serde_json::from_str(text).unwrap();
     let number = |row: &serde_json::Value, key: &str| row[key].as_f64().unwrap();
-    let rows = all["ring"]["rows"].as_array().unwrap();
+    let rows = document["ring"]["rows"].as_array().unwrap();
     let after = rows.iter().position(|row| number(row, "delta") >= approach).unwrap();
     // Cubic through four rows.
     let first = after.saturating_sub(2).min(rows.len() - 4);
-    let own: Vec<[f64; 2]> =
+    let nearest: Vec<[f64; 2]> =
         rows[first..first + 4].iter().map(|row| [number(row, "delta"), number(row, "F")]).collect();
     let weight = |i: usize| -> f64 {
-        (0..4).filter(|&j| j != i).map(|j| (approach - own[j][0]) / (own[i][0] - own[j][0])).product()
+        (0..4)
+            .filter(|&j| j != i)
+            .map(|j| (approach - nearest[j][0]) / (nearest[i][0] - nearest[j][0]))
+            .product()
     };
-    (0..4).map(|i| own[i][1] * weight(i)).sum()
+    (0..4).map(|i| nearest[i][1] * weight(i)).sum()
 }
 
 /// A ring of t/R = 1/100 between two plates, up to where it has a flat part. Its force at an approach of its
@@ -150,7 +153,7 @@ struct Rebound {
 
 /// A ring of 1 mm dropped at 0.5 m/s, in steps of a length [s].
 fn dropped(integrator: Integrator, step: f64) -> Rebound {
-    let (mut model, own, _) = ring(64, 1e-3);
+    let (mut model, skin, _) = ring(64, 1e-3);
     let barrier = 2e-4;
     let curve = Curve { shape: CurveShape::Hold, from: 0.0, to: 1.0 };
     let kind = LoadKind::Gravity { body: 0, acceleration: [0.0, 0.0, -9.81] };
@@ -158,7 +161,7 @@ fn dropped(integrator: Integrator, step: f64) -> Rebound {
     let floor = fixed("floor", Shape::HalfSpace, [0.0, 0.0, -RADIUS - 3e-3], [0.0; 3]);
     touch(
         &mut model,
-        at_rigid(&own, vec![floor], 0.0, 5e-4),
+        at_rigid(&skin, vec![floor], 0.0, 5e-4),
         BarrierSettings { distance: barrier, stiffness: 0.1 * YOUNG, creep_speed: 1e-3 },
     );
     let settings =

@@ -64,10 +64,10 @@ fn a_block_on_a_spring_sticks_and_slips() {
         // A spring at each node, by its mass, so that nothing bends.
         let [end, expected] = exact(time.max(0.0), stuck);
         let spring = |node: u32| {
-            let own = node as usize;
-            let mut anchor = model.place(own) + Vector3::x() * (rest + end);
-            (anchor.y, anchor.z) = (state.position[own].y, state.position[own].z);
-            Spring { node, anchor, stiffness: rate * model.mass[own] }
+            let index = node as usize;
+            let mut anchor = model.place(index) + Vector3::x() * (rest + end);
+            (anchor.y, anchor.z) = (state.position[index].y, state.position[index].z);
+            Spring { node, anchor, stiffness: rate * model.mass[index] }
         };
         let springs: Vec<Spring> = (0..model.rest.len() as u32).map(spring).collect();
         solver.grip(&springs);

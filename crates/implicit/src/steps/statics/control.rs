@@ -122,8 +122,8 @@ impl Statics {
         system.gather(&system.forces.controlled, &mut self.controlled);
         system.respond(&self.controlled, &mut self.response).map_err(fatal)?;
         let components = &system.stiffness.equations.component;
-        let along = |x: &[f64], all: &[f64]| -> f64 {
-            components.iter().zip(x).map(|(&c, x)| all[c as usize] * x).sum()
+        let along = |x: &[f64], whole: &[f64]| -> f64 {
+            components.iter().zip(x).map(|(&c, x)| whole[c as usize] * x).sum()
         };
         let factor = match control {
             Control::ArcLength { length } if first => {

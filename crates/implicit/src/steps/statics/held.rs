@@ -49,7 +49,8 @@ fn parts(model: &Assembly) -> (DisjointSets, Vec<bool>) {
             part.join(nodes[0] as usize, node as usize);
         }
     }
-    for constraint in model.constraints.iter().filter(|own| matches!(own.motion, Motion::Rigid)) {
+    for constraint in model.constraints.iter().filter(|constraint| matches!(constraint.motion, Motion::Rigid))
+    {
         for &node in &constraint.nodes {
             part.join(constraint.nodes[0] as usize, node as usize);
         }
@@ -111,7 +112,7 @@ impl<'a> Holding<'a> {
                 self.sums[first] += row.transpose() * row;
             }
         }
-        for constraint in model.constraints.iter().filter(|own| !own.motion.is_collective()) {
+        for constraint in model.constraints.iter().filter(|constraint| !constraint.motion.is_collective()) {
             for &node in &constraint.nodes {
                 let components = if turning[node as usize] { 6 } else { 3 };
                 self.add_node(node as usize, (0..components).filter(|&c| constraint.components[c]));

@@ -138,7 +138,7 @@ impl Statics {
         let model = model.into();
         check_held(&model)?;
         let system = System::new(Arc::clone(&model), settings.linear)?;
-        let (all, free) = (6 * model.rest.len(), system.stiffness.equations.count());
+        let (components, free) = (6 * model.rest.len(), system.stiffness.equations.count());
         let (slack, extent) = slack(&model, &system);
         Ok(Self {
             settings,
@@ -148,10 +148,10 @@ impl Statics {
             attempts: Vec::new(),
             length: model.mean_edge(),
             round_off: model.round_off(),
-            pending: vec![0.0; all],
-            increment: vec![0.0; all],
-            gradient: vec![0.0; all],
-            direction: vec![0.0; all],
+            pending: vec![0.0; components],
+            increment: vec![0.0; components],
+            gradient: vec![0.0; components],
+            direction: vec![0.0; components],
             residual: vec![0.0; free],
             solution: vec![0.0; free],
             response: vec![0.0; free],
@@ -201,9 +201,9 @@ impl Statics {
         self.find_residual(state);
         self.system.prepare()?;
         self.system.solve(&self.residual, &mut self.solution)?;
-        let mut all = self.pending.clone();
-        self.system.spread(&self.solution, &mut all);
-        Ok(all.chunks_exact(6).map(|c| [c[0], c[1], c[2], c[3], c[4], c[5]]).collect())
+        let mut displacements = self.pending.clone();
+        self.system.spread(&self.solution, &mut displacements);
+        Ok(displacements.chunks_exact(6).map(|c| [c[0], c[1], c[2], c[3], c[4], c[5]]).collect())
     }
 
     /// Begins a load step to a time [s]. In the first one comes in what the state is off its curves.
@@ -273,9 +273,10 @@ impl Statics {
                 *state = before;
                 let [first, second] = self.halves(control, state);
                 let middle = state.time.midpoint(until);
-                let told = |Attempt { error, retry }| Attempt { error: error.after(larger.broken()), retry };
-                let parts = self.halved(state, first, middle, halvings - 1).map_err(told)?.parts;
-                let step = self.halved(state, second, until, halvings - 1).map_err(told)?;
+                let explained =
+                    |Attempt { error, retry }| Attempt { error: error.after(larger.broken()), retry };
+                let parts = self.halved(state, first, middle, halvings - 1).map_err(explained)?.parts;
+                let step = self.halved(state, second, until, halvings - 1).map_err(explained)?;
                 Ok(Step { parts: parts + step.parts, ..step })
             }
             Err(attempt) => Err(attempt),
@@ -479,8 +480,8 @@ impl Statics {
         let size = |(&component, &residual): (&u32, &f64)| {
             (if component % 6 < 3 { residual.abs() } else { residual.abs() / self.length }, component / 6)
         };
-        let all = system.stiffness.equations.component.iter().zip(&self.residual).map(size);
-        all.fold((f64::NEG_INFINITY, 0), |worst, next| if next.0 > worst.0 { next } else { worst }).1
+        let residuals = system.stiffness.equations.component.iter().zip(&self.residual).map(size);
+        residuals.fold((f64::NEG_INFINITY, 0), |worst, next| if next.0 > worst.0 { next } else { worst }).1
     }
 
     /// The part of the increment that turns no node by more than the limit.

@@ -103,20 +103,20 @@ fn stiffness_is_the_change_of_forces(model: Assembly, unknowns: usize) {
     };
     let (first, way) = (direction(3e-3), direction(1e-3));
     let spread = |system: &System, values: &[f64]| {
-        let mut all = vec![0.0; 6 * model.rest.len()];
-        system.spread(values, &mut all);
-        all
+        let mut components = vec![0.0; 6 * model.rest.len()];
+        system.spread(values, &mut components);
+        components
     };
     system.advance(&mut state, &spread(&system, &first), 1.0);
     let forces = |system: &mut System, part: f64| {
         let mut moved = state.clone();
         system.evaluate(&state, 0.0, None).unwrap();
-        let all = spread(system, &way);
-        system.advance(&mut moved, &all, part);
+        let increment = spread(system, &way);
+        system.advance(&mut moved, &increment, part);
         system.evaluate(&moved, 0.0, None).unwrap();
-        let mut own = vec![0.0; count];
-        system.gather(&system.forces.internal, &mut own);
-        (dot(&own, &way), system.forces.energy)
+        let mut free = vec![0.0; count];
+        system.gather(&system.forces.internal, &mut free);
+        (dot(&free, &way), system.forces.energy)
     };
     let h = 1e-4;
     let [(ahead, above), (behind, below)] = [h, -h].map(|part| forces(&mut system, part));
@@ -125,9 +125,9 @@ fn stiffness_is_the_change_of_forces(model: Assembly, unknowns: usize) {
     system.evaluate(&state, 0.0, Some(&still)).unwrap();
     let mut product = vec![0.0; count];
     system.stiffness.matrix.multiply_values(&system.stiffness.matrix.value, &way, &mut product);
-    let (own, wanted) = (dot(&product, &way), (ahead - behind) / (2.0 * h));
-    println!("{own} {wanted}");
-    assert!((own - wanted).abs() < 1e-6 * wanted.abs(), "{own} {wanted}");
+    let (found, wanted) = (dot(&product, &way), (ahead - behind) / (2.0 * h));
+    println!("{found} {wanted}");
+    assert!((found - wanted).abs() < 1e-6 * wanted.abs(), "{found} {wanted}");
 }
 
 /// A bar whose free end is turned by 2.5 rad follows as one body without stress; a free one keeps its shape
@@ -152,8 +152,8 @@ fn moves_rigidly(mut model: Assembly) {
     let turn = pliant_shells::rotation::exponential(&(Vector3::new(0.3, -0.2, 0.9).normalize() * 2.5));
     // The beads follow with an offset that does not turn.
     let count = model.rest.len();
-    let all = (0..20).chain(22..count);
-    let off = all.map(|node| (state.position[node] - turn * model.place(node)).norm()).fold(0.0, f64::max);
+    let nodes = (0..20).chain(22..count);
+    let off = nodes.map(|node| (state.position[node] - turn * model.place(node)).norm()).fold(0.0, f64::max);
     let mut forces = crate::Forces::new(model.clone());
     forces.evaluate(&state).unwrap();
     println!("static: {off:.1e} m, {:.1e} J", forces.strain_energy());

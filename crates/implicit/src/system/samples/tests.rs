@@ -68,14 +68,15 @@ fn surfaces_of_points_are_watertight() {
             samples.place(&model, &state);
             let mut shared = 0;
             for (at, point) in samples.points.iter().enumerate() {
-                let own = model.facets[point.facet as usize].nodes;
-                let held = (0..3).filter(|&k| point.weights[k] > 0.0).map(|k| (own[k], point.weights[k]));
+                let corners = model.facets[point.facet as usize].nodes;
+                let held = (0..3).filter(|&k| point.weights[k] > 0.0).map(|k| (corners[k], point.weights[k]));
                 let held: Vec<(u32, f64)> = held.collect();
                 for facet in 0..model.facets.len() as u32 {
                     let nodes = model.facets[facet as usize].nodes;
                     if held.len() == 2 && held.iter().all(|(node, _)| nodes.contains(node)) {
-                        let weights =
-                            nodes.map(|node| held.iter().find(|own| own.0 == node).map_or(0.0, |own| own.1));
+                        let weights = nodes.map(|node| {
+                            held.iter().find(|corner| corner.0 == node).map_or(0.0, |corner| corner.1)
+                        });
                         let there = samples.surface.patch(&model, &state, facet).point(weights);
                         let off = (there - samples.places[model.rest.len() + at]).norm();
                         assert!(off < 1e-15, "{off}");
@@ -135,7 +136,7 @@ fn gaps_come_to_those_of_the_sphere_with_the_level() {
             model
                 .normals
                 .iter_mut()
-                .for_each(|own| own.direction = Vector3::from(rest[own.node as usize]).normalize());
+                .for_each(|normal| normal.direction = Vector3::from(rest[normal.node as usize]).normalize());
         }
         let model = Arc::new(model);
         let state = AssemblyState::at_rest(&model);
@@ -162,7 +163,7 @@ fn gaps_come_to_those_of_the_sphere_with_the_level() {
 #[test]
 fn allowed_parts_leave_gaps_on_curved_ways() {
     let mut random = Random::new(8);
-    let (mut shortened, mut all) = (0, 0);
+    let (mut shortened, mut tries) = (0, 0);
     for level in [1, 2] {
         for _ in 0..40 {
             let model = Arc::new(model(ball(1), 0.01));
@@ -179,7 +180,7 @@ fn allowed_parts_leave_gaps_on_curved_ways() {
             for _ in 0..3 {
                 part = system.collision_free_fraction(&state, &turns, [0.1, part]);
                 shortened += u32::from(part < 1.0);
-                all += 1;
+                tries += 1;
                 let mut there = state.clone();
                 there.advance(&turns, part);
                 system.evaluate(&there, None);
@@ -189,6 +190,6 @@ fn allowed_parts_leave_gaps_on_curved_ways() {
             }
         }
     }
-    println!("{shortened} of {all} were shortened");
-    assert!(shortened > 20 && all > 150);
+    println!("{shortened} of {tries} were shortened");
+    assert!(shortened > 20 && tries > 150);
 }
