@@ -56,9 +56,9 @@ pub fn straight_edges(
         for &(facet, i) in sides {
             for (k, [start, _]) in EDGES.into_iter().enumerate().filter(|(k, _)| k / 2 == i) {
                 let node = facets[facet].nodes[start];
-                let own = normal(facet, node);
+                let here = normal(facet, node);
                 straight[facet][k] =
-                    sides.iter().any(|&(other, _)| normal(other, node) != own || leans(other, own));
+                    sides.iter().any(|&(other, _)| normal(other, node) != here || leans(other, here));
             }
         }
     }

@@ -219,12 +219,12 @@ mod tests {
         let patch = Patch::new(p, n, [false; 6], rule);
         let l = weights(&mut random);
         let (v, w) = (vector(&mut random), vector(&mut random));
-        let mut all = Vector18::zeros();
+        let mut motion = Vector18::zeros();
         for (i, p) in p.iter().enumerate() {
-            all.fixed_rows_mut::<3>(6 * i).copy_from(&(v + w.cross(p)));
-            all.fixed_rows_mut::<3>(6 * i + 3).copy_from(&w);
+            motion.fixed_rows_mut::<3>(6 * i).copy_from(&(v + w.cross(p)));
+            motion.fixed_rows_mut::<3>(6 * i + 3).copy_from(&w);
         }
-        let off = patch.jacobian(l) * all - v - w.cross(&patch.point(l));
+        let off = patch.jacobian(l) * motion - v - w.cross(&patch.point(l));
         assert!(off.norm() < 1e-13, "{off}");
     }
 

@@ -18,10 +18,10 @@ use crate::rotation::skew;
 
 /// ∫ F_a (F_b,u F_c,v − F_c,u F_b,v) over the triangle of area ½: constants of the cubic patch.
 static WEIGHTS: LazyLock<[[[f64; 9]; 9]; 9]> = LazyLock::new(|| {
-    let mut all = [[[0.0; 9]; 9]; 9];
+    let mut table = [[[0.0; 9]; 9]; 9];
     for point in points() {
         let [along, across] = &point.slopes;
-        for (a, weights) in all.iter_mut().enumerate() {
+        for (a, weights) in table.iter_mut().enumerate() {
             let value = 0.5 * point.weight * point.value[a];
             for (b, weights) in weights.iter_mut().enumerate() {
                 for (c, weight) in weights.iter_mut().enumerate() {
@@ -30,7 +30,7 @@ static WEIGHTS: LazyLock<[[[f64; 9]; 9]; 9]> = LazyLock::new(|| {
             }
         }
     }
-    all
+    table
 });
 
 /// The weights of b_b × b_c on each control point, for the pairs b < c in their order. Side by side, the sum
@@ -53,10 +53,10 @@ impl Patch {
     /// Nodal forces [m²] and moments [m³] of a pressure of 1: ∫ Jᵀ n dA.
     pub fn pressure_forces(&self) -> Vector18 {
         let forces = self.control_forces();
-        let mut all = Vector18::zeros();
+        let mut nodal = Vector18::zeros();
         let mut add = |row: usize, part: &Vector3<f64>| {
-            let mut own = all.fixed_rows_mut::<3>(row);
-            own += part;
+            let mut rows = nodal.fixed_rows_mut::<3>(row);
+            rows += part;
         };
         (0..3).for_each(|corner| add(6 * corner, &forces[corner]));
         for (k, ([start, end], force)) in EDGES.into_iter().zip(&forces[3..]).enumerate() {
@@ -66,7 +66,7 @@ impl Patch {
             // Over the spin of the start, δn = −S(n) φ.
             add(6 * start + 3, &self.normals()[start].cross(&turning));
         }
-        all
+        nodal
     }
 
     /// ⅓ ∫ x·n dA [m³]: over a closed surface the volume in it.
@@ -109,8 +109,8 @@ impl Patch {
                 let arm: Vector3<f64> = place.iter().zip(weights).map(|(b, weights)| b * weights[c]).sum();
                 let arm = skew(&arm);
                 let mut add = |column: usize, block: Matrix3<f64>| {
-                    let mut own = moved.fixed_columns_mut::<3>(column);
-                    own += block;
+                    let mut columns = moved.fixed_columns_mut::<3>(column);
+                    columns += block;
                 };
                 if c < 3 {
                     add(6 * c, arm);
@@ -123,8 +123,8 @@ impl Patch {
                 add(6 * start + 3, arm * turning);
             }
             let mut add = |row: usize, block: &Matrix3x18| {
-                let mut own = change.fixed_rows_mut::<3>(row);
-                own += block;
+                let mut rows = change.fixed_rows_mut::<3>(row);
+                rows += block;
             };
             if a < 3 {
                 add(6 * a, &moved);
@@ -153,8 +153,8 @@ impl Patch {
         let slope = self.edge_derivative(k).1.tr_mul(force);
         let both = -spin * nn * spin + normal * slope.transpose() - Matrix3::identity() * slope.dot(normal);
         let mut add = |row: usize, column: usize, block: &Matrix3<f64>| {
-            let mut own = change.fixed_view_mut::<3, 3>(row, column);
-            own += block;
+            let mut entries = change.fixed_view_mut::<3, 3>(row, column);
+            entries += block;
         };
         for (row, sign) in [(start, -1.0), (end, 1.0)] {
             for (column, other) in [(start, -1.0), (end, 1.0)] {
@@ -261,15 +261,16 @@ mod tests {
                 (0.906_179_845_938_664, 0.236_926_885_056_189_1),
             ];
             for side in 0..3 {
-                let own = [side, 3 + 2 * side, 4 + 2 * side, (side + 1) % 3];
+                let controls = [side, 3 + 2 * side, 4 + 2 * side, (side + 1) % 3];
                 for (at, weight) in line {
                     let (s, r) = (0.5 * (1.0 + at), 0.5 * (1.0 - at));
                     let value = [r * r * r, 3.0 * r * r * s, 3.0 * r * s * s, s * s * s];
                     let slope = [-3.0 * r * r, 3.0 * r * (r - 2.0 * s), 3.0 * s * (2.0 * r - s), 3.0 * s * s];
-                    let sum =
-                        |w: [f64; 4]| own.iter().zip(w).map(|(&b, w)| place[b] * w).sum::<Vector3<f64>>();
+                    let sum = |w: [f64; 4]| {
+                        controls.iter().zip(w).map(|(&b, w)| place[b] * w).sum::<Vector3<f64>>()
+                    };
                     let moment = sum(value).cross(&sum(slope)) * (0.5 * weight / 3.0);
-                    for (&b, value) in own.iter().zip(value) {
+                    for (&b, value) in controls.iter().zip(value) {
                         expected += maps[b].tr_mul(&(moment * value));
                     }
                 }

@@ -11,13 +11,13 @@ pub fn skew(a: &Vector3<f64>) -> Matrix3<f64> {
 
 /// Coefficients of the series of arcsin(x)/x in x².
 pub(crate) const ARCSINE: [f64; 13] = {
-    let (mut all, mut k) = ([1.0; 13], 0);
+    let (mut terms, mut k) = ([1.0; 13], 0);
     while k < 12 {
         let odd = (2 * k + 1) as f64;
-        all[k + 1] = all[k] * odd * odd / ((odd + 1.0) * (odd + 2.0));
+        terms[k + 1] = terms[k] * odd * odd / ((odd + 1.0) * (odd + 2.0));
         k += 1;
     }
-    all
+    terms
 };
 
 /// |B₂ₙ|/(2n)! from n = 1 on, with Bernoulli's numbers.

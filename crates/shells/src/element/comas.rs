@@ -46,7 +46,7 @@ pub fn comas_2010(corners: &Corners, elastic: &PlaneStress, thickness: f64) -> M
     let stiffness = elastic.matrix * (thickness.powi(3) / 12.0);
     let weight = area(corners) / 3.0;
     let middles = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| 0.5 * (local[i] + local[j]));
-    let own = middles.iter().fold(Matrix9::zeros(), |sum, &point| {
+    let bending = middles.iter().fold(Matrix9::zeros(), |sum, &point| {
         let b = curvature(point) * inverse;
         sum + b.transpose() * stiffness * b * weight
     });
@@ -58,5 +58,5 @@ pub fn comas_2010(corners: &Corners, elastic: &PlaneStress, thickness: f64) -> M
         turn[(i + 2, i + 1)] = -along.y;
         turn[(i + 2, i + 2)] = along.x;
     }
-    turn.transpose() * own * turn
+    turn.transpose() * bending * turn
 }

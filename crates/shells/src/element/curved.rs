@@ -60,7 +60,7 @@ impl CurvedMembrane {
                 ]);
             }
         }
-        let strain = sums.iter().zip(&maps).fold(Matrix3x18::zeros(), |all, (sum, map)| all + sum * map);
+        let strain = sums.iter().zip(&maps).fold(Matrix3x18::zeros(), |total, (sum, map)| total + sum * map);
         Self { area, strain: strain / area, hierarchical: hierarchical(&normals, gradient) }
     }
 }
@@ -83,8 +83,8 @@ fn add_drilling(patch: &Patch, normals: &[Vector3<f64>; 3], maps: &mut [Matrix3x
         let aside = normal.cross(&reach).normalize();
         let map = &mut maps[3 + k];
         let mut turn = -aside.transpose() * *map;
-        let mut own = turn.fixed_columns_mut::<3>(6 * start);
-        own += aside.transpose();
+        let mut shift = turn.fixed_columns_mut::<3>(6 * start);
+        shift += aside.transpose();
         let mut spin = turn.fixed_columns_mut::<3>(6 * start + 3);
         spin += normal.transpose() * reach.norm();
         *map += aside * (DRILLING_TO_EDGE * turn);

@@ -28,8 +28,9 @@ impl Orthotropic {
     /// True if every deformation costs energy: moduli above 0, and ν₁₂² < E₁/E₂.
     pub fn is_stable(&self) -> bool {
         let [first, second] = self.young;
-        let all = [first, second, self.shear].iter().all(|modulus| *modulus > 0.0 && modulus.is_finite());
-        all && self.poisson * self.poisson < first / second
+        let positive =
+            [first, second, self.shear].iter().all(|modulus| *modulus > 0.0 && modulus.is_finite());
+        positive && self.poisson * self.poisson < first / second
     }
 
     /// Stress (σ₁₁, σ₂₂, σ₁₂) over strain (ε₁₁, ε₂₂, γ₁₂) [Pa].
@@ -132,12 +133,12 @@ impl Section {
             plies.push(Ply { heights: [bottom, top], stiffness });
             bottom = top;
         }
-        let mut all = Matrix6::zeros();
+        let mut stiffness = Matrix6::zeros();
         for (row, column, part) in [(0, 0, &a), (0, 3, &b), (3, 0, &b), (3, 3, &d)] {
-            all.fixed_view_mut::<3, 3>(row, column).copy_from(part);
+            stiffness.fixed_view_mut::<3, 3>(row, column).copy_from(part);
         }
         // Of stable layers it is positive definite.
-        let compliance = all.try_inverse().unwrap_or_else(|| Matrix6::repeat(f64::NAN));
+        let compliance = stiffness.try_inverse().unwrap_or_else(|| Matrix6::repeat(f64::NAN));
         Self { stretch: a, coupling: b, flexure: d, compliance, plies, thickness: whole, mean: mean(layers) }
     }
 
@@ -160,9 +161,10 @@ impl Section {
         forces: &Vector3<f64>,
         moments: &Vector3<f64>,
     ) -> ([Vector3<f64>; 3], impl Iterator<Item = Vector3<f64>>) {
-        let own =
+        let strains =
             self.compliance * Vector6::new(forces.x, forces.y, forces.z, moments.x, moments.y, moments.z);
-        let (strain, curvature) = (own.fixed_rows::<3>(0).into_owned(), own.fixed_rows::<3>(3).into_owned());
+        let (strain, curvature) =
+            (strains.fixed_rows::<3>(0).into_owned(), strains.fixed_rows::<3>(3).into_owned());
         let at = move |ply: &Ply, height: f64| ply.stiffness * (strain + height * curvature);
         let [first, last] = [self.plies.first(), self.plies.last()]
             .map(|ply| ply.copied().unwrap_or(Ply { heights: [0.0; 2], stiffness: Matrix3::zeros() }));

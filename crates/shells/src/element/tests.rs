@@ -150,11 +150,11 @@ fn patch_error(
     for (number, triangle) in triangles.iter().enumerate() {
         let nodes = [0, 1, 2].map(|i| triangle[(i + start(number)) % 3]);
         let corners = nodes.map(|node| points[node]);
-        let (own, values) = (stiffness(&corners, &ELASTIC.into(), 1e-3), field(&corners));
+        let (element, values) = (stiffness(&corners, &ELASTIC.into(), 1e-3), field(&corners));
         for i in 0..9 {
             exact[3 * nodes[i / 3] + i % 3] = values[i];
             for j in 0..9 {
-                k[(3 * nodes[i / 3] + i % 3, 3 * nodes[j / 3] + j % 3)] += own[(i, j)];
+                k[(3 * nodes[i / 3] + i % 3, 3 * nodes[j / 3] + j % 3)] += element[(i, j)];
             }
         }
     }

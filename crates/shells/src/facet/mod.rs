@@ -198,8 +198,8 @@ impl Facet {
         let area = area(&corners);
         let mass = density * thickness * area / 3.0;
         let section = layers.map(|(layers, direction)| {
-            let own = axes.tr_mul(direction);
-            Box::new(Section::new(layers, own.y.atan2(own.x)))
+            let local = axes.tr_mul(direction);
+            Box::new(Section::new(layers, local.y.atan2(local.x)))
         });
         let [elastic, bent] = match &section {
             None => [PlaneStress::from(elastic); 2],
@@ -419,15 +419,16 @@ impl Facet {
     pub fn stresses(&self, resultants: &Resultants) -> ([Vector3<f64>; 3], f64) {
         let mises = |s: &Vector3<f64>| (s.x * s.x - s.x * s.y + s.y * s.y + 3.0 * s.z * s.z).sqrt();
         let Some(section) = &self.section else {
-            let all = [0.5, 0.0, -0.5].map(|part| resultants.stress(self.thickness, part * self.thickness));
-            return (all, all.iter().map(mises).fold(0.0, f64::max));
+            let stresses =
+                [0.5, 0.0, -0.5].map(|part| resultants.stress(self.thickness, part * self.thickness));
+            return (stresses, stresses.iter().map(mises).fold(0.0, f64::max));
         };
         // The tension at rest is the same in all layers.
         let tension = Vector3::new(self.tension.1, self.tension.1, 0.0);
         let elastic = resultants.membrane - tension;
-        let (all, faces) = section.stresses(&elastic, &resultants.moment);
+        let (stresses, faces) = section.stresses(&elastic, &resultants.moment);
         let whole = |stress: Vector3<f64>| stress + tension / self.thickness;
-        (all.map(whole), faces.map(|stress| mises(&whole(stress))).fold(0.0, f64::max))
+        (stresses.map(whole), faces.map(|stress| mises(&whole(stress))).fold(0.0, f64::max))
     }
 
     /// Strain of the facet.
@@ -436,8 +437,8 @@ impl Facet {
             (0..3).map(|i| placed.local[i][row] * self.gradient[i][column]).sum()
         };
         let strain = Vector3::new(entry(0, 0) - 1.0, entry(1, 1) - 1.0, entry(0, 1) + entry(1, 0));
-        let own = SVector::<f64, 9>::from_fn(|i, _| placed.deformation[BENDING[i]]);
-        ShellStrain::new(&strain, &(self.mean_curvature * own), self.thickness)
+        let bending = SVector::<f64, 9>::from_fn(|i, _| placed.deformation[BENDING[i]]);
+        ShellStrain::new(&strain, &(self.mean_curvature * bending), self.thickness)
     }
 
     /// Thickness [m] with the strain across from plane stress, t (A/A₀)^(−ν/(1 − ν)). For small strains the
@@ -468,12 +469,12 @@ impl Facet {
 }
 
 /// Strains over the nine displacements at some places, over all eighteen.
-fn spread(places: [usize; 9], own: &SMatrix<f64, 3, 9>) -> Matrix3x18 {
-    let mut all = Matrix3x18::zeros();
+fn spread(places: [usize; 9], strains: &SMatrix<f64, 3, 9>) -> Matrix3x18 {
+    let mut wide = Matrix3x18::zeros();
     for (column, place) in places.into_iter().enumerate() {
-        all.set_column(place, &own.column(column));
+        wide.set_column(place, &strains.column(column));
     }
-    all
+    wide
 }
 
 /// Adds a part of the stiffness at its places among the eighteen.

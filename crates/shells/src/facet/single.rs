@@ -93,8 +93,8 @@ impl Facet {
                 let mut block = k.fixed_view_mut::<3, 3>(6 * i, 6 * j + 3);
                 block -= g.transposed_before(&turned);
             }
-            let mut own = k.fixed_view_mut::<3, 3>(6 * j + 3, 6 * j + 3);
-            own += corrections[j];
+            let mut block = k.fixed_view_mut::<3, 3>(6 * j + 3, 6 * j + 3);
+            block += corrections[j];
         }
         self.frame_change(placed, &spun, &g, &arm, &mut k);
         k
@@ -149,8 +149,8 @@ fn project(placed: &Placed, g: &[Sparse; 3], force: &Vector18) -> Vector18 {
     let moment = placed.moment(force);
     let mut projected = *force;
     for (i, g) in g.iter().enumerate() {
-        let mut own = projected.fixed_rows_mut::<3>(6 * i);
-        own -= mean + Vector3::new(g.zx * moment.z, g.zy * moment.z, g.xz * moment.x + g.yz * moment.y);
+        let mut on_node = projected.fixed_rows_mut::<3>(6 * i);
+        on_node -= mean + Vector3::new(g.zx * moment.z, g.zy * moment.z, g.xz * moment.x + g.yz * moment.y);
     }
     projected
 }

@@ -142,12 +142,12 @@ fn packs_have_forces_and_stiffness_of_single_facets() {
         let facets: Vec<Facet> =
             (0..11).map(|k| facet(orders[k % 3]).under_tension(10.0 * k as f64)).collect();
         let packs = FacetPack::all(Arch::new(), &facets, |node| rest()[node as usize]);
-        for (pack, own) in packs.iter().zip(facets.chunks(PACK)) {
+        for (pack, chunk) in packs.iter().zip(facets.chunks(PACK)) {
             let mut work = Work::new();
-            let poses: Vec<Pose> = own.iter().map(|_| pose(&mut random, size)).collect();
+            let poses: Vec<Pose> = chunk.iter().map(|_| pose(&mut random, size)).collect();
             poses.iter().enumerate().for_each(|(lane, (x, rotation))| work.put(lane, x, rotation));
-            work.find(Arch::new(), pack, own.len(), true);
-            for (lane, (facet, (x, rotation))) in own.iter().zip(&poses).enumerate() {
+            work.find(Arch::new(), pack, chunk.len(), true);
+            for (lane, (facet, (x, rotation))) in chunk.iter().zip(&poses).enumerate() {
                 let placed = &facet.place(x, rotation).unwrap();
                 assert_eq!(work.broken(lane), None);
                 let ((energy, force), mut tangent) = (work.force(lane), Matrix18::zeros());

@@ -64,8 +64,8 @@ impl FacetPack {
             for (row, column) in (0..18).flat_map(|row| (0..=row).map(move |column| (row, column))) {
                 pack.stiffness[place(row, column)][lane] = facet.stiffness()[(row, column)];
             }
-            for (entry, own) in pack.tension.iter_mut().zip(facet.tension().iter()) {
-                entry[lane] = *own;
+            for (entry, value) in pack.tension.iter_mut().zip(facet.tension().iter()) {
+                entry[lane] = *value;
             }
             for (k, entry) in pack.gradient.iter_mut().enumerate() {
                 entry[lane] = facet.gradient()[k / 2][k % 2];
@@ -82,8 +82,8 @@ impl FacetPack {
 
 /// Puts (w, x, y, z) into a lane.
 fn put_turn(to: &mut [Pack], lane: usize, turn: &UnitQuaternion<f64>) {
-    for (entry, own) in to.iter_mut().zip([turn.w, turn.i, turn.j, turn.k]) {
-        entry[lane] = own;
+    for (entry, value) in to.iter_mut().zip([turn.w, turn.i, turn.j, turn.k]) {
+        entry[lane] = value;
     }
 }
 
@@ -140,8 +140,8 @@ impl Work {
 
     /// Puts the nodes of a facet into a lane: positions [m] and rotations from rest.
     pub fn put(&mut self, lane: usize, x: &[Vector3<f64>; 3], rotation: &[UnitQuaternion<f64>; 3]) {
-        for (entry, own) in self.position.iter_mut().zip(x.iter().flatten()) {
-            entry[lane] = *own;
+        for (entry, value) in self.position.iter_mut().zip(x.iter().flatten()) {
+            entry[lane] = *value;
         }
         for (to, rotation) in self.rotation.chunks_mut(4).zip(rotation) {
             put_turn(to, lane, rotation);
@@ -501,24 +501,24 @@ impl<S: Simd> Now<S> {
     ) {
         let mut left = [[[Lane::splat(self.simd, 0.0); 3]; 3]; 3];
         for (i, left) in left.iter_mut().enumerate() {
-            let mut own = over.of_rigid[2 * i];
+            let mut change = over.of_rigid[2 * i];
             let [p, f] = [&self.projected[2 * i], &self.spun[2 * i]];
-            add_half_skew(&mut own, &[p[0] + f[0], p[1] + f[1], p[2] + f[2]]);
+            add_half_skew(&mut change, &[p[0] + f[0], p[1] + f[1], p[2] + f[2]]);
             // Of the change of G: the frame tilts with the corners.
             let g = &self.spin[i];
             let tilt = (g.xz * self.moment[1]).less(g.yz, self.moment[0]);
-            own[2][2] = own[2][2] - tilt.half();
-            *left = difference(&own, &g.transposed_before(whole));
+            change[2][2] = change[2][2] - tilt.half();
+            *left = difference(&change, &g.transposed_before(whole));
         }
         for i in 0..3 {
             for j in 0..=i {
-                let mut own = difference(
+                let mut change = difference(
                     &block(self.simd, pack, register, [2 * i, 2 * j]),
                     &self.spin[j].after(&left[i]),
                 );
-                own = difference(&own, &transpose(&self.spin[i].after(&left[j])));
-                self.add_frame_change(&mut own, i, j);
-                self.write(work, register, [2 * i, 2 * j], &own);
+                change = difference(&change, &transpose(&self.spin[i].after(&left[j])));
+                self.add_frame_change(&mut change, i, j);
+                self.write(work, register, [2 * i, 2 * j], &change);
             }
         }
     }
@@ -527,42 +527,42 @@ impl<S: Simd> Now<S> {
     #[inline(always)]
     fn write_turns(&self, over: &OverSpins<S>, work: &mut Work, register: usize) {
         for i in 0..3 {
-            let mut own = sum(&over.of_rigid[2 * i + 1], &over.corrections[i]);
-            add_half_skew(&mut own, &self.projected[2 * i + 1]);
+            let mut turn = sum(&over.of_rigid[2 * i + 1], &over.corrections[i]);
+            add_half_skew(&mut turn, &self.projected[2 * i + 1]);
             for (j, block) in over.mixed[i].iter().enumerate() {
-                let own = difference(block, &self.spin[j].after(&own));
+                let mixed = difference(block, &self.spin[j].after(&turn));
                 if i >= j {
-                    self.write(work, register, [2 * i + 1, 2 * j], &own);
+                    self.write(work, register, [2 * i + 1, 2 * j], &mixed);
                 } else {
-                    self.write(work, register, [2 * j, 2 * i + 1], &transpose(&own));
+                    self.write(work, register, [2 * j, 2 * i + 1], &transpose(&mixed));
                 }
             }
             for j in 0..=i {
-                let own = over.turned[place(i, j)];
-                let own = if i == j { sum(&own, &over.corrections[i]) } else { own };
-                self.write(work, register, [2 * i + 1, 2 * j + 1], &own);
+                let turned = over.turned[place(i, j)];
+                let turned = if i == j { sum(&turned, &over.corrections[i]) } else { turned };
+                self.write(work, register, [2 * i + 1, 2 * j + 1], &turned);
             }
         }
     }
 
     /// Adds ½ (Bᵢⱼ + Bⱼᵢᵀ), Bᵢⱼ = e_z nᵢᵀ (Mx nⱼy − My nⱼx) + Mz hᵢ rⱼᵀ/tr.
     #[inline(always)]
-    fn add_frame_change(&self, own: &mut Square<S>, i: usize, j: usize) {
+    fn add_frame_change(&self, block: &mut Square<S>, i: usize, j: usize) {
         let [mx, my, mz] = three(|k| self.moment[k].half());
         let (a, b) = (&self.spin[i], &self.spin[j]);
         let tilt = |g: &Sparse<S>| (mx * g.xz).plus(my, g.yz);
         let (tilt_a, tilt_b) = (tilt(a), tilt(b));
         // n = (−yz, xz).
-        own[2][0] = own[2][0].less(a.yz, tilt_b);
-        own[2][1] = own[2][1].plus(a.xz, tilt_b);
-        own[0][2] = own[0][2].less(b.yz, tilt_a);
-        own[1][2] = own[1][2].plus(b.xz, tilt_a);
+        block[2][0] = block[2][0].less(a.yz, tilt_b);
+        block[2][1] = block[2][1].plus(a.xz, tilt_b);
+        block[0][2] = block[0][2].less(b.yz, tilt_a);
+        block[1][2] = block[1][2].plus(b.xz, tilt_a);
         // h = (zx, zy), r = (zy, −zx).
         let [ha, hb] = [[a.zx, a.zy], [b.zx, b.zy]];
         let [ra, rb] = [[a.zy, -a.zx], [b.zy, -b.zx]];
         for r in 0..2 {
             for c in 0..2 {
-                own[r][c] = own[r][c].plus(mz, (ha[r] * rb[c]).plus(ra[r], hb[c]));
+                block[r][c] = block[r][c].plus(mz, (ha[r] * rb[c]).plus(ra[r], hb[c]));
             }
         }
     }

@@ -71,10 +71,10 @@ fn place_corners<S: Simd>(simd: S, pack: &FacetPack, work: &mut Work, register: 
         entries.iter().enumerate().for_each(|(c, entry)| entry.store(&mut work.axes[3 * row + c], register));
     }
     for (i, [x, y]) in flat.into_iter().enumerate() {
-        for (c, own) in [(x * cosine).plus(y, sine), (y * cosine).less(x, sine)].into_iter().enumerate() {
-            own.store(&mut work.local[2 * i + c], register);
+        for (c, value) in [(x * cosine).plus(y, sine), (y * cosine).less(x, sine)].into_iter().enumerate() {
+            value.store(&mut work.local[2 * i + c], register);
             let rest = Lane::load(simd, &pack.corners[2 * i + c], register);
-            (own - rest).store(&mut work.deformation[6 * i + c], register);
+            (value - rest).store(&mut work.deformation[6 * i + c], register);
         }
     }
     axes
@@ -91,11 +91,11 @@ fn turn_of<S: Simd>(simd: S, m: &Square<S>) -> Turn<S> {
     let mut largest = best[0];
     let others = [[x, one + a - b - c, xy, xz], [y, xy, one - a + b - c, yz], [z, xz, yz, one - a - b + c]];
     for (k, other) in others.into_iter().enumerate() {
-        let own = other[k + 1];
+        let diagonal = other[k + 1];
         for (best, other) in best.iter_mut().zip(other) {
-            *best = largest.if_less(own, other, *best);
+            *best = largest.if_less(diagonal, other, *best);
         }
-        largest = largest.if_less(own, own, largest);
+        largest = largest.if_less(diagonal, diagonal, largest);
     }
     let scale = Lane::splat(simd, 0.5).over(largest.sqrt());
     [best[0] * scale, best[1] * scale, best[2] * scale, best[3] * scale]
