@@ -77,8 +77,8 @@ fn run(arguments: &Run) -> Result<u8, Failure> {
     }
     let folder = match &checkpoint {
         Some(checkpoint) => {
-            let own = checkpoint.path().parent().unwrap_or(Path::new(""));
-            let path = arguments.out.clone().unwrap_or_else(|| own.to_owned());
+            let parent = checkpoint.path().parent().unwrap_or(Path::new(""));
+            let path = arguments.out.clone().unwrap_or_else(|| parent.to_owned());
             OutputFolder::reopen(path, &world.scene, checkpoint)?
         }
         None => fresh_folder(arguments, &world.scene)?,
@@ -107,7 +107,7 @@ fn run(arguments: &Run) -> Result<u8, Failure> {
             (String::new(), Some(format!("{error}; {}", error.remedy)), pliant_run::failed_output(&error))
         }
     };
-    let told = match arguments.json {
+    let printed = match arguments.json {
         true => say(json),
         false if words.is_empty() => Ok(()),
         false => say(words),
@@ -117,7 +117,7 @@ fn run(arguments: &Run) -> Result<u8, Failure> {
         // This error matters more than failed standard output.
         return Ok(if interrupted { signals::exit_code() } else { 1 });
     }
-    told.map(|()| SUCCESS)
+    printed.map(|()| SUCCESS)
 }
 
 /// A run with fewer steps takes less than a day on any machine.
@@ -278,13 +278,13 @@ fn told_failures(sweep: &Sweep, failures: &[(usize, String)]) {
 /// Rejects a sweep with invalid combinations; an error shared by several is reported once.
 fn refuse_mistakes(sweep: &Sweep, threads: usize) -> Result<(), Failure> {
     let mistakes = sweep.check(threads);
-    let mut told = Vec::<String>::new();
+    let mut reported = Vec::<String>::new();
     for (run, errors) in &mistakes {
         let text = errors.plain().to_string();
-        if !told.contains(&text) {
+        if !reported.contains(&text) {
             eprintln!("run-{run:04} ({}):", sweep.title(*run));
             report::show(errors);
-            told.push(text);
+            reported.push(text);
         }
     }
     if mistakes.is_empty() {

@@ -340,10 +340,10 @@ impl Around<'_> {
         let mut planes = Vec::new();
         let mut most = 0.0_f64;
         for (part, now) in frame.parts() {
-            let Some(all) = part.method.contacts() else { continue };
-            for contact in &all.contacts {
+            let Some(contacts) = part.method.contacts() else { continue };
+            for contact in &contacts.contacts {
                 let With::Rigid(index) = contact.with else { continue };
-                let rigid = &all.rigids[index];
+                let rigid = &contacts.rigids[index];
                 if rigid.tool() != self.tool {
                     continue;
                 }

@@ -122,12 +122,13 @@ fn shell_thickness(mesh: &Mesh) -> Option<Percentiles> {
     }
     let at_points = mesh.point_data.get("thickness").filter(|data| data.components == 1);
     let of_face = |kind: CellKind, index: u32, nodes: &[u32]| {
-        let own = mesh.block(kind)?.data.get("thickness").filter(|data| data.components == 1);
+        let at_cells = mesh.block(kind)?.data.get("thickness").filter(|data| data.components == 1);
         let mean = |data: &[f64]| {
             let values = nodes.iter().filter_map(|&node| data.get(node as usize));
             values.sum::<f64>() / nodes.len() as f64
         };
-        own.and_then(|data| data.values.get(index as usize).copied())
+        at_cells
+            .and_then(|data| data.values.get(index as usize).copied())
             .or_else(|| at_points.map(|data| mean(&data.values)))
     };
     let surface = boundary(mesh);
@@ -146,9 +147,9 @@ impl Against {
                 .map_err(|error| Failure::plain(error, "distances are measured between surfaces"))
         };
         let target = surface(&read(other, scale, "--against-scale")?.mesh)?;
-        let own = surface(mesh)?;
+        let measured = surface(mesh)?;
         let diagonal = target.diagonal();
-        let (distances, farthest) = Hausdorff::with_places(&own, &target, diagonal / SAMPLES);
+        let (distances, farthest) = Hausdorff::with_places(&measured, &target, diagonal / SAMPLES);
         Ok(Self { distances, farthest, diagonal })
     }
 

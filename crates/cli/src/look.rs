@@ -89,11 +89,12 @@ fn colour_by(look: &mut Look, field: FieldName, component: Option<&str>) {
 /// Colours by a field of any name, as in files, or by labels.
 pub(crate) fn colour_by_name(look: &mut Look, name: &str) {
     look.style.labels = name == "label";
-    let (own, part) = name.split_once(':').map_or((name, None), |(own, part)| (own, Some(part)));
+    let (field_name, part) =
+        name.split_once(':').map_or((name, None), |(field_name, part)| (field_name, Some(part)));
     if name == "none" || look.style.labels {
         look.field = None;
         look.style.range = None;
-    } else if let Some(field) = FieldName::of_name(own) {
+    } else if let Some(field) = FieldName::of_name(field_name) {
         colour_by(look, field, part);
     } else {
         look.field = Some(name.into());

@@ -103,15 +103,15 @@ pub fn open(path: &Path, sandbox: bool, allow_partial: bool) -> Result<Opened, F
         reads.map_err(|error| Failure::plain(failed(error), "check the path and the permissions"))
     };
     let file = pliant_format::scene_file(path);
-    let own = reads(file.parent().unwrap_or(Path::new("")))?;
+    let allowed = reads(file.parent().unwrap_or(Path::new("")))?;
     if pliant_format::is_mesh(path) {
         let help = "`pliant info` reads a mesh file on its own";
         let made = pliant_format::scene_of_mesh(path).map_err(|error| Failure::plain(error, help))?;
-        let source = Source::parse(path.display().to_string(), made.text)?.reading(own);
+        let source = Source::parse(path.display().to_string(), made.text)?.reading(allowed);
         return Ok(Opened { source, folder: made.folder, assumed: Some(made.assumed), _translated: None });
     }
     if !path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("xml")) {
-        let (source, folder) = pliant_format::open_within(path, own)?;
+        let (source, folder) = pliant_format::open_within(path, allowed)?;
         return Ok(Opened { source, folder, assumed: None, _translated: None });
     }
     let folder = tempfile::tempdir().map_err(|error| {
@@ -120,7 +120,7 @@ pub fn open(path: &Path, sandbox: bool, allow_partial: bool) -> Result<Opened, F
             "check the free space, or set TMPDIR",
         )
     })?;
-    let notes = translate(path, &own, &folder.path().join("scene.toml"), allow_partial)?;
+    let notes = translate(path, &allowed, &folder.path().join("scene.toml"), allow_partial)?;
     notes.iter().for_each(|note| eprintln!("note: {note}"));
     let (source, place) = pliant_format::open_within(folder.path(), reads(folder.path())?)?;
     Ok(Opened { source, folder: place, assumed: None, _translated: Some(folder) })

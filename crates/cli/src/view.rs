@@ -28,8 +28,8 @@ impl From<WindowError> for Failure {
 pub fn view(arguments: &View) -> Result<u8, Failure> {
     let began = Instant::now();
     if let Some(run) = finished_run(arguments)? {
-        if let Some(told) = open_finished(run)? {
-            say(told)?;
+        if let Some(summary) = open_finished(run)? {
+            say(summary)?;
         }
         return Ok(SUCCESS);
     }
@@ -56,7 +56,7 @@ pub fn view(arguments: &View) -> Result<u8, Failure> {
             Failure::Plain { message, .. } => message,
         })
     };
-    let told = open(Opening {
+    let summary = open(Opening {
         look: look_of,
         file: pliant_format::scene_file(&arguments.scene),
         world,
@@ -67,8 +67,8 @@ pub fn view(arguments: &View) -> Result<u8, Failure> {
         size: arguments.size,
         began,
     })?;
-    if let Some(told) = told {
-        say(told)?;
+    if let Some(summary) = summary {
+        say(summary)?;
     }
     Ok(if stop().is_asked() { exit_code() } else { SUCCESS })
 }
@@ -116,13 +116,14 @@ fn repeat(world: &World, file: &Path, real_time: bool) -> Result<u8, Failure> {
     let recording = Recording::from_bytes(&bytes).map_err(|error| wrong(&error))?;
     match replay_until(world, &recording, stop()) {
         Ok(replayed) => {
-            let mut told = serde_json::to_value(&replayed).map_err(|error| wrong(&error))?;
+            let mut summary = serde_json::to_value(&replayed).map_err(|error| wrong(&error))?;
             if real_time {
                 let played = replay_in_real_time(world, &recording, stop());
                 let played = played.map_err(|message| Failure::plain(message, ""))?;
-                told["input_lag"] = serde_json::to_value(Lags::of(&played)).map_err(|error| wrong(&error))?;
+                summary["input_lag"] =
+                    serde_json::to_value(Lags::of(&played)).map_err(|error| wrong(&error))?;
             }
-            say(told)?;
+            say(summary)?;
             for Break { times: [broken, back], message } in &replayed.breaks {
                 eprintln!(
                     "error: at t = {} s a pull broke the run, which then went back to t = {} s: {message}",

@@ -192,9 +192,11 @@ impl FromStr for Frames {
 pub type Numbers<const N: usize> = [f64; N];
 
 pub(super) fn numbers<const N: usize>(typed: &str) -> Result<Numbers<N>, String> {
-    let all: Option<Vec<f64>> =
+    let values: Option<Vec<f64>> =
         typed.split(',').map(|part| part.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect();
-    all.and_then(|all| all.try_into().ok()).ok_or_else(|| format!("give {N} numbers separated by commas"))
+    values
+        .and_then(|values| values.try_into().ok())
+        .ok_or_else(|| format!("give {N} numbers separated by commas"))
 }
 
 pub(super) fn range(typed: &str) -> Result<Numbers<2>, String> {

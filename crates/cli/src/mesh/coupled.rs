@@ -152,7 +152,7 @@ impl<'a> Sources<'a> {
     fn of(arguments: &'a MeshImage) -> Result<Self, Failure> {
         let vessels = || arguments.vessels.iter().map(|(label, _)| label);
         if arguments.masks.is_empty() {
-            let list = |all: Vec<String>| all.join(", ");
+            let list = |names: Vec<String>| names.join(", ");
             let groups =
                 arguments.label.iter().filter(|label| matches!(label, LabelChoice::Group(..))).count();
             if groups > 0 && groups < arguments.label.len() {
@@ -161,9 +161,9 @@ impl<'a> Sources<'a> {
                     "make each label a group, such as `--label liver=5`",
                 ));
             }
-            let all = list(arguments.label.iter().map(typed).collect());
+            let listed = list(arguments.label.iter().map(typed).collect());
             let mut labels =
-                if groups > 0 { format!("label = {{ {all} }}") } else { format!("labels = [{all}]") };
+                if groups > 0 { format!("label = {{ {listed} }}") } else { format!("labels = [{listed}]") };
             if !arguments.vessels.is_empty() {
                 labels += &format!(", vessels = [{}]", list(vessels().map(typed).collect()));
             }
@@ -231,10 +231,10 @@ fn typed(label: &LabelChoice) -> String {
 /// The source of a body in its `mesh`, with names and cleaning.
 fn source(arguments: &MeshImage, folder: &Path, files: &[&PathBuf], labels: &str) -> String {
     let path = |path: &Path| serde_json::Value::from(from_folder(path, folder).to_string_lossy()).to_string();
-    let all: Vec<String> = files.iter().map(|file| path(file)).collect();
-    let all = all.join(", ");
+    let paths: Vec<String> = files.iter().map(|file| path(file)).collect();
+    let paths = paths.join(", ");
     let mut source =
-        if arguments.masks.is_empty() { format!("image = {all}") } else { format!("masks = [{all}]") };
+        if arguments.masks.is_empty() { format!("image = {paths}") } else { format!("masks = [{paths}]") };
     source += &format!(", {labels}");
     if let Some(names) = &arguments.names {
         let known = names.as_os_str() == "totalsegmentator";

@@ -135,8 +135,8 @@ pub(crate) fn regions_in(mut image: Image, arguments: &MeshImage, bar: &Bar) -> 
             Choice::From(least)
         }
         _ if masks && arguments.label.is_empty() => {
-            let all = LabelChoice::Range(1, arguments.masks.len() as i32 + 1);
-            image.choose(&[all]).map_err(refused)?
+            let every_mask = LabelChoice::Range(1, arguments.masks.len() as i32 + 1);
+            image.choose(&[every_mask]).map_err(refused)?
         }
         _ => image.choose(&arguments.label).map_err(refused)?,
     };

@@ -474,10 +474,10 @@ fn largest_line(name: &str, found: &Deviation) -> String {
 }
 
 fn label_line(region: &LabelReport) -> String {
-    let own = format!("label {:<10} {} cells, {:.2} ml", region.label, region.cells, region.volume * 1e6);
+    let line = format!("label {:<10} {} cells, {:.2} ml", region.label, region.cells, region.volume * 1e6);
     match region.volume_error() {
-        Some(error) => format!("{own} ({:+.2} % of the input)", error * 100.0),
-        None => own,
+        Some(error) => format!("{line} ({:+.2} % of the input)", error * 100.0),
+        None => line,
     }
 }
 

@@ -200,8 +200,8 @@ fn portrait(
     Ok(SUCCESS)
 }
 
-pub(super) fn claim(arguments: &Render, own: fn(&str) -> bool) -> Result<OutputFolder, Failure> {
-    OutputFolder::claim(arguments.out.clone(), arguments.force, own)
+pub(super) fn claim(arguments: &Render, is_own: fn(&str) -> bool) -> Result<OutputFolder, Failure> {
+    OutputFolder::claim(arguments.out.clone(), arguments.force, is_own)
         .map_err(|error| Failure::plain(&error, error.remedy))
 }
 
@@ -292,7 +292,7 @@ fn refuse_words_of_scenes(arguments: &Render) -> Result<(), Failure> {
 
 /// Removes the outputs of a scene; returns the simulated time between the displayed frames [s].
 fn forget_outputs(scene: &mut Scene, arguments: &Render) -> f64 {
-    let own = std::mem::take(&mut scene.outputs).into_iter().find_map(|(_, output)| match output {
+    let interval = std::mem::take(&mut scene.outputs).into_iter().find_map(|(_, output)| match output {
         OutputTable::Vtu(VtuTable { every, .. }) => Some(every),
         OutputTable::Csv(_) => None,
     });
@@ -311,21 +311,21 @@ fn forget_outputs(scene: &mut Scene, arguments: &Render) -> f64 {
     scene.view.contacts |= arguments.contacts;
     scene.view.marks |= arguments.marks;
     scene.view.critical |= arguments.critical;
-    arguments.every.or(own).unwrap_or(0.01 * scene.scene.until)
+    arguments.every.or(interval).unwrap_or(0.01 * scene.scene.until)
 }
 
 /// Adds colour and hidden labels of the command line to the scene's values, so that the scene checks them.
 fn with_view(arguments: &Render) -> Overrides {
-    let mut all = arguments.overrides.clone();
+    let mut overrides = arguments.overrides.clone();
     if let Some(name) = arguments.colour.as_deref() {
-        let (own, part) = name.split_once(':').map_or((name, None), |(own, part)| (own, Some(part)));
-        all.set.push(format!("view.colour={own}"));
-        all.set.extend(part.map(|part| format!("view.component={part}")));
+        let (field, part) = name.split_once(':').map_or((name, None), |(field, part)| (field, Some(part)));
+        overrides.set.push(format!("view.colour={field}"));
+        overrides.set.extend(part.map(|part| format!("view.component={part}")));
     }
     if !arguments.hide.is_empty() {
-        all.set.push(format!("view.hide={}", serde_json::json!(arguments.hide)));
+        overrides.set.push(format!("view.hide={}", serde_json::json!(arguments.hide)));
     }
-    all
+    overrides
 }
 
 /// The name of a picture in its folder.

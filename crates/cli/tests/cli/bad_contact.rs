@@ -236,10 +236,10 @@ fn what_cannot_go_on_ends_with_its_last_state() {
             "after 3 iterations: residual",
         ),
     ] {
-        let (told, workshop) = run(&scene, &cube());
-        let words = told.words();
-        assert!(told.code == 1 && words.contains(says), "{row}: {}\n{words}", told.code);
-        let error = &told.json()["error"];
+        let (said, workshop) = run(&scene, &cube());
+        let words = said.words();
+        assert!(said.code == 1 && words.contains(says), "{row}: {}\n{words}", said.code);
+        let error = &said.json()["error"];
         let is_blocked = says.contains("blocked");
         assert_eq!(error["kind"], if is_blocked { "blocked" } else { "not-converged" }, "{row}");
         if is_blocked {

@@ -243,8 +243,8 @@ fn tets_come_in_several_sizes_and_within_a_distance() {
     };
     let even = cells(&["-o", "even.vtu"]);
     let graded = cells(&["--inner-edge", "6mm", "-o", "graded.vtu"]);
-    let [all, fewer] = [&even, &graded].map(|json| json["cells"].as_u64().expect("a number of cells"));
-    assert!(4 * fewer < 3 * all, "{fewer} of {all}");
+    let [many, fewer] = [&even, &graded].map(|json| json["cells"].as_u64().expect("a number of cells"));
+    assert!(4 * fewer < 3 * many, "{fewer} of {many}");
     // Longer than any edge of one size may be.
     let longest = graded["edges"]["longest"].as_f64().unwrap();
     assert!(longest > 1.6 * 1.5e-3 && longest < 1.6 * 6e-3, "{graded}");

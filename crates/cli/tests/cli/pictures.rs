@@ -123,8 +123,8 @@ mod with_pictures {
         }
         let workshop = short("colour = 'displacement'\nedges = true\ncamera = { azimuth = 20, up = 'y' }\n");
         let take = |folder: &str, more: &[&str]| -> Vec<u8> {
-            let all = [&["render", "case", "--step", "1e-3", "-o", folder], more].concat();
-            done(&workshop.pliant(&all));
+            let arguments = [&["render", "case", "--step", "1e-3", "-o", folder], more].concat();
+            done(&workshop.pliant(&arguments));
             fs::read(workshop.path(folder).join("frame-00005.png")).unwrap()
         };
         let plain = take("plain", &[]);
@@ -160,8 +160,8 @@ mod with_pictures {
         }
         let workshop = short("");
         let take = |more: &[&str]| -> Vec<u8> {
-            let all = [&["render", "case", "--step", "1e-3", "-o", "pictures"], more].concat();
-            done(&workshop.pliant(&all));
+            let arguments = [&["render", "case", "--step", "1e-3", "-o", "pictures"], more].concat();
+            done(&workshop.pliant(&arguments));
             fs::read(workshop.path("pictures/frame-00005.png")).unwrap()
         };
         let mut seen = BTreeSet::new();
@@ -203,8 +203,8 @@ mod with_pictures {
         workshop.write("scenes/README.md", "no scene");
         let arguments = ["render", "scenes", "-o", "gallery", "--until", "0.004"];
         done(&workshop.pliant(&arguments));
-        let all = ["README.md", "one.png", "two.png"].map(String::from);
-        assert_eq!(names(&workshop, "gallery"), BTreeSet::from(all));
+        let expected = ["README.md", "one.png", "two.png"].map(String::from);
+        assert_eq!(names(&workshop, "gallery"), BTreeSet::from(expected));
         assert_eq!(png(&workshop, "gallery/two.png").0, [640, 400]);
         let page = workshop.read("gallery/README.md");
         for piece in
@@ -234,7 +234,7 @@ mod with_pictures {
         let last = workshop.path("out/case/marks/000002.vtu");
         let mesh = pliant_geometry::io::read(&last).unwrap().mesh;
         let held = &mesh.point_data["constraint"].values;
-        assert_eq!([1.0, 2.0].map(|kind| held.iter().filter(|own| **own == kind).count()), [9, 9]);
+        assert_eq!([1.0, 2.0].map(|kind| held.iter().filter(|value| **value == kind).count()), [9, 9]);
         let pressed: f64 = mesh.point_data["load"].values.chunks(3).map(|force| force[2]).sum();
         // The pressure times the area of the upper side, which the pull stretches by a tenth and thins.
         assert!(pressed < -0.9 && pressed > -1.2, "{pressed} N");
@@ -244,7 +244,7 @@ mod with_pictures {
         let has = |name: &str| {
             let picture = Picture::from_png(&fs::read(workshop.path(name)).unwrap()).unwrap();
             [[40, 44, 52], [206, 112, 20], [24, 128, 80]]
-                .map(|own: [u8; 3]| picture.rgb().chunks(3).filter(|pixel| *pixel == own).count() > 5)
+                .map(|colour: [u8; 3]| picture.rgb().chunks(3).filter(|pixel| *pixel == colour).count() > 5)
         };
         assert_eq!(has("out/case/picture.png"), [true; 3]);
         let render = |what: &str, out: &str, more: &[&str]| {

@@ -327,23 +327,23 @@ fn alternatives<'s>(schema: &'s Value, root: &'s Value) -> Vec<&'s Value> {
 
 /// Asserts that a schema has every key of a value, recursively.
 fn assert_known(value: &toml::Value, schemas: &[&Value], root: &Value, path: &str) {
-    let all: Vec<&Value> = schemas.iter().flat_map(|schema| alternatives(schema, root)).collect();
+    let choices: Vec<&Value> = schemas.iter().flat_map(|schema| alternatives(schema, root)).collect();
     match value {
         toml::Value::Table(table) => {
             for (key, child) in table {
                 let of = |schema: &&'_ Value| {
-                    let own = schema["properties"].get(key);
-                    let found =
-                        own.or_else(|| schema.get("additionalProperties").filter(|other| other.is_object()));
+                    let property = schema["properties"].get(key);
+                    let found = property
+                        .or_else(|| schema.get("additionalProperties").filter(|other| other.is_object()));
                     found.cloned()
                 };
-                let known: Vec<Value> = all.iter().filter_map(of).collect();
+                let known: Vec<Value> = choices.iter().filter_map(of).collect();
                 assert!(!known.is_empty(), "the schema has no `{path}.{key}`");
                 assert_known(child, &known.iter().collect::<Vec<_>>(), root, &format!("{path}.{key}"));
             }
         }
         toml::Value::Array(items) => {
-            let of_items: Vec<&Value> = all.iter().filter_map(|schema| schema.get("items")).collect();
+            let of_items: Vec<&Value> = choices.iter().filter_map(|schema| schema.get("items")).collect();
             items.iter().for_each(|item| assert_known(item, &of_items, root, path));
         }
         _ => {}

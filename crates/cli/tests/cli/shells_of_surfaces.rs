@@ -83,9 +83,9 @@ fn normals(mesh: &Mesh) -> (f64, usize) {
     let mut largest = 0.0_f64;
     for nodes in mesh.block(CellKind::Triangle).unwrap().cells() {
         let [a, b, c] = [0, 1, 2].map(|k| mesh.points[nodes[k] as usize]);
-        let own = (b - a).cross(&(c - a));
+        let across = (b - a).cross(&(c - a));
         let given = nodes.iter().map(|&n| normal(n)).filter(|n| *n != Vector3::zeros());
-        largest = given.map(|n| n.angle(&own).to_degrees()).fold(largest, f64::max);
+        largest = given.map(|n| n.angle(&across).to_degrees()).fold(largest, f64::max);
     }
     let nodes = 0..mesh.points.len() as u32;
     (largest, nodes.filter(|&n| normal(n) == Vector3::zeros()).count())

@@ -210,9 +210,9 @@ fn standard_output_that_cannot_be_written_is_reported() {
     let workshop = Workshop::new(BLOCK);
     for arguments in [&["schema"][..], &["run", "case"], &["run", "case", "--json", "--force"]] {
         let output = workshop.command(arguments).stdout(full()).output().unwrap();
-        let told = Said::from(output);
-        assert_eq!(told.code, 1, "{arguments:?}: {}", told.err);
-        assert!(told.err.contains("error: standard output cannot be written"), "{}", told.err);
+        let said = Said::from(output);
+        assert_eq!(said.code, 1, "{arguments:?}: {}", said.err);
+        assert!(said.err.contains("error: standard output cannot be written"), "{}", said.err);
     }
     assert!(workshop.read("out/case/summary.md").contains("Done: "));
 }

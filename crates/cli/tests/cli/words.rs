@@ -126,8 +126,10 @@ fn an_organ_that_the_image_cuts_off_is_warned_of() {
 fn masks_are_one_image_of_labels() {
     let workshop = workshop();
     for (name, label) in [("liver.nii", 1), ("tumour.nii", 2)] {
-        let mask =
-            Volume { values: organ().values.iter().map(|&own| i16::from(own == label)).collect(), ..organ() };
+        let mask = Volume {
+            values: organ().values.iter().map(|&voxel| i16::from(voxel == label)).collect(),
+            ..organ()
+        };
         workshop.write(name, nifti1(&mask, Form::Sform, false));
     }
     let output = mesh(&workshop, &["liver.nii", "tumour.nii"]);
@@ -235,14 +237,14 @@ fn a_mesh_of_a_scene_takes_a_turn() {
         let mut ball = sphere(60.0, 3, 100_000).expect("a sphere");
         ball.points.iter_mut().for_each(|point| *point += nalgebra::Vector3::new(70.0, -40.0, 20.0));
         io::write(&workshop.path("case/ball.stl"), &ball).expect("the mesh is written");
-        let told =
+        let meshed =
             workshop.pliant(&["mesh", "case/ball.stl", "--scale", "0.001", "--edge", "8mm", "-o", "x.vtu"]);
-        assert_eq!(told.code, 0, "{}", told.err);
+        assert_eq!(meshed.code, 0, "{}", meshed.err);
         let output = "[output.fields]\ntype = \"vtu\"\nevery = 0.001\n";
         let text = workshop.read("case/scene.toml") + output;
         workshop.write("case/scene.toml", text);
-        let told = workshop.pliant(&["run", "case", "--out", "out"]);
-        assert_eq!(told.code, 0, "{}", told.err);
+        let ran = workshop.pliant(&["run", "case", "--out", "out"]);
+        assert_eq!(ran.code, 0, "{}", ran.err);
         let (low, high) = io::read(&workshop.path("out/fields/000000.vtu")).unwrap().mesh.bounds().unwrap();
         (low + high) / 2.0
     };
@@ -265,8 +267,10 @@ fn scene(mesh: &str) -> Workshop {
     );
     workshop.write("case/seg.nii", nifti1(&organ(), Form::Sform, false));
     for (name, label) in [("liver.nii", 1), ("tumour.nii", 2)] {
-        let mask =
-            Volume { values: organ().values.iter().map(|&own| i16::from(own == label)).collect(), ..organ() };
+        let mask = Volume {
+            values: organ().values.iter().map(|&voxel| i16::from(voxel == label)).collect(),
+            ..organ()
+        };
         workshop.write(&format!("case/{name}"), nifti1(&mask, Form::Sform, false));
     }
     let ball = sphere(60.0, 3, 100_000).expect("a sphere");
@@ -292,8 +296,8 @@ fn a_scene_says_labels_by_name_and_masks_and_is_asked_about_units() {
     ] {
         let output = scene(mesh).pliant(&["check", "case"]);
         assert_eq!(output.code, code, "{mesh}: {}", output.err);
-        let all = format!("{} {}", output.words(), output.out);
-        assert!(all.contains(says), "{mesh}: no `{says}` in: {all}");
+        let printed = format!("{} {}", output.words(), output.out);
+        assert!(printed.contains(says), "{mesh}: no `{says}` in: {printed}");
     }
 }
 
