@@ -261,8 +261,8 @@ impl SceneErrors {
         for diagnostic in &mut diagnostics {
             diagnostic.option = diagnostic.option.take().map(visible);
             // For a place outside the text miette would show nothing.
-            let own = diagnostic.option.clone().unwrap_or_else(|| text.clone());
-            diagnostic.span = diagnostic.span.take().map(|span| clamp(&own, span));
+            let shown = diagnostic.option.clone().unwrap_or_else(|| text.clone());
+            diagnostic.span = diagnostic.span.take().map(|span| clamp(&shown, span));
             diagnostic.message = shortened(std::mem::take(&mut diagnostic.message));
             diagnostic.label = shortened(std::mem::take(&mut diagnostic.label));
             diagnostic.help = diagnostic.help.take().map(shortened);

@@ -39,16 +39,17 @@ const BY_WORD: [(&str, &str, &str); 3] = [
 /// ```
 pub fn foreign_file(path: &Path) -> Option<[&'static str; 2]> {
     let ending = path.extension()?.to_str()?;
-    let own = BY_ENDING.iter().find(|(known, ..)| ending.eq_ignore_ascii_case(known));
-    own.map(|&(_, what, help)| [what, help])
+    let entry = BY_ENDING.iter().find(|(known, ..)| ending.eq_ignore_ascii_case(known));
+    entry.map(|&(_, what, help)| [what, help])
 }
 
 /// Returns the kind of a text and advice, if the text is XML and not TOML.
 pub(crate) fn foreign_text(text: &str) -> Option<[&'static str; 2]> {
     text.trim_start_matches('\u{feff}').trim_start().starts_with('<').then(|| {
-        let own = BY_WORD.iter().find(|(word, ..)| text.contains(word));
-        own.map_or(["XML", "a scene is written in TOML: `pliant new NAME` writes one"], |&(_, what, help)| {
-            [what, help]
-        })
+        let entry = BY_WORD.iter().find(|(word, ..)| text.contains(word));
+        entry.map_or(
+            ["XML", "a scene is written in TOML: `pliant new NAME` writes one"],
+            |&(_, what, help)| [what, help],
+        )
     })
 }

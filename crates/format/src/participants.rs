@@ -255,15 +255,16 @@ impl Scene {
     fn check_walls(&self, groups: &[(String, Vec<String>)], out: &mut Vec<Diagnostic>) {
         for (name, table) in &self.bodies {
             let Some(host) = &table.on else { continue };
-            let (Some((own, _)), Some((other, _))) = (group_of(groups, name), group_of(groups, host)) else {
+            let (Some((wall_group, _)), Some((other, _))) = (group_of(groups, name), group_of(groups, host))
+            else {
                 continue;
             };
-            if own == other {
+            if wall_group == other {
                 continue;
             }
             let named = |group| self.participants.iter().any(|(known, _)| known == group);
             let (message, label, help) = match table.model == BodyModel::Shell
-                && !(named(own) && named(other))
+                && !(named(wall_group) && named(other))
             {
                 true => (
                     format!(
@@ -275,7 +276,7 @@ impl Scene {
                 ),
                 false => (
                     format!(
-                        "`{name}` shares the nodes of `{host}`, but belongs to participant `{own}`, and `{host}` to `{other}`"
+                        "`{name}` shares the nodes of `{host}`, but belongs to participant `{wall_group}`, and `{host}` to `{other}`"
                     ),
                     "different participants",
                     "name both in one participant",
@@ -360,7 +361,7 @@ impl Scene {
         let is_whole = |tie: &TieTable| tie.between.iter().all(|on| owns(on));
         Self {
             run: self.run_of(table.map(|(_, table)| table), &part.models),
-            own: table.map(|(name, _)| name.clone()),
+            participant: table.map(|(name, _)| name.clone()),
             is_part: true,
             participants: Vec::new(),
             laws: part.laws(),
@@ -421,16 +422,16 @@ impl Scene {
 
     /// True if the run of this scene, or of this participant, has a key of its own.
     pub fn gives(&self, key: &str) -> bool {
-        match &self.own {
-            Some(own) => self.source.node(&["participant", own, key]).is_some(),
+        match &self.participant {
+            Some(participant) => self.source.node(&["participant", participant, key]).is_some(),
             None => !self.is_part && self.source.node(&["run", key]).is_some(),
         }
     }
 
     /// Path of a key of the run: in the table of the participant if it is given there, else in `[run]`.
     pub fn run_at<'k>(&'k self, key: &'k str) -> Vec<&'k str> {
-        if let Some(own) = &self.own {
-            let path = vec!["participant", own.as_str(), key];
+        if let Some(participant) = &self.participant {
+            let path = vec!["participant", participant.as_str(), key];
             if self.source.node(&path).is_some() {
                 return path;
             }
@@ -446,6 +447,7 @@ impl Scene {
 
     /// True if one of its bodies or surfaces has this name.
     pub fn has(&self, name: &str) -> bool {
-        self.bodies.iter().any(|(own, _)| own == name) || self.surfaces.iter().any(|(own, _)| own == name)
+        self.bodies.iter().any(|(known, _)| known == name)
+            || self.surfaces.iter().any(|(known, _)| known == name)
     }
 }

@@ -102,8 +102,8 @@ pub fn python(sections: &[Section]) -> String {
     }
     names.push("Table".into());
     names.sort_unstable();
-    let all: Vec<String> = names.iter().map(|name| format!("    \"{name}\",\n")).collect();
-    page + &format!("\n\n__all__ = [\n{}]\n", all.concat())
+    let lines: Vec<String> = names.iter().map(|name| format!("    \"{name}\",\n")).collect();
+    page + &format!("\n\n__all__ = [\n{}]\n", lines.concat())
 }
 
 /// `NeoHookean` of `neo-hookean`.
@@ -147,14 +147,16 @@ fn python_class(name: &str, section: &Section, doc: &str, parameters: &[Paramete
         section.name.map_or("None".into(), |name| format!("\"{name}\""))
     ));
     let keys: Vec<String> =
-        parameters.iter().map(|own| format!("\"{}\": \"{}\"", of(own), own.key)).collect();
+        parameters.iter().map(|parameter| format!("\"{}\": \"{}\"", of(parameter), parameter.key)).collect();
     page.push_str(&format!("    _keys: ClassVar[dict[str, str]] = {{{}}}\n", keys.join(", ")));
     if !parameters.is_empty() {
         page.push('\n');
     }
     // Parameters without a default come first, as in any signature.
-    for parameter in
-        parameters.iter().filter(|own| own.required).chain(parameters.iter().filter(|own| !own.required))
+    for parameter in parameters
+        .iter()
+        .filter(|parameter| parameter.required)
+        .chain(parameters.iter().filter(|parameter| !parameter.required))
     {
         let kind = python_type(parameter);
         page.push_str(&match parameter.required {
@@ -208,14 +210,14 @@ fn describe_forms(schemas: Forms<'_>, forms: &[Form<'_>], depth: usize) -> Vec<P
     let common = |key: &str| forms.len() > 1 && forms.iter().all(|form| form.property(key).is_some());
     for form in forms {
         // The description of one of several tables goes to the key that only this table has.
-        let own = form.properties.iter().filter(|(key, _)| !common(key)).count();
+        let distinct = form.properties.iter().filter(|(key, _)| !common(key)).count();
         for (key, schema) in &form.properties {
             let of_all = forms.iter().all(|form| form.required.contains(key));
             if parameters.iter().all(|known| known.key != *key) {
                 let mut found = parameter(schemas, key, schema, of_all, depth);
                 // The form describes the value better than its type does.
                 let said = schema.get("description").is_some();
-                if let Some(doc) = form.doc.filter(|_| !said && own == 1 && !common(key)) {
+                if let Some(doc) = form.doc.filter(|_| !said && distinct == 1 && !common(key)) {
                     found.description = doc.to_owned();
                     found.unit = unit(Some(doc)).to_owned();
                 }

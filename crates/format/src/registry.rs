@@ -143,14 +143,14 @@ pub struct LawTable {
 /// Reads a table `[law.NAME]`.
 pub(crate) fn read_law(source: &Source, path: &[&str], out: &mut Vec<Diagnostic>) -> Option<LawTable> {
     let name = type_of(source, path, "law", AnyLaw::NAMES, out)?;
-    let own = AnyLaw::schema(name)?;
+    let schema = AnyLaw::schema(name)?;
     let before = out.len();
-    let written = check_skipping(source.node(path)?, &path.join("."), &law_schema(&own), &["type"], out);
+    let written = check_skipping(source.node(path)?, &path.join("."), &law_schema(&schema), &["type"], out);
     if out[before..].iter().any(Diagnostic::is_error) {
         return None;
     }
-    let (own, extras) = divide(written, &own);
-    let law = AnyLaw::from_json(name, own).map_err(|error| {
+    let (parameters, extras) = divide(written, &schema);
+    let law = AnyLaw::from_json(name, parameters).map_err(|error| {
         let place = source.span(&[path, &[error.key]].concat());
         out.push(Diagnostic::error(error.message).at(place, "here").help(error.help));
     });
@@ -161,16 +161,16 @@ pub(crate) fn read_law(source: &Source, path: &[&str], out: &mut Vec<Diagnostic>
 }
 
 /// The keys of a law's own parameters, and the rest.
-fn divide(table: Json, own: &Schema) -> (Json, Json) {
+fn divide(table: Json, schema: &Schema) -> (Json, Json) {
     let Json::Object(entries) = table else { return (table, json!({})) };
-    let known = |key: &str| own.get("properties").and_then(|p| p.get(key)).is_some();
-    let (own, rest): (Map<_, _>, Map<_, _>) = entries.into_iter().partition(|(key, _)| known(key));
-    (Json::Object(own), Json::Object(rest))
+    let known = |key: &str| schema.get("properties").and_then(|p| p.get(key)).is_some();
+    let (parameters, rest): (Map<_, _>, Map<_, _>) = entries.into_iter().partition(|(key, _)| known(key));
+    (Json::Object(parameters), Json::Object(rest))
 }
 
 /// The parameters of a law together with what every law can have.
-fn law_schema(own: &Schema) -> Schema {
-    let mut merged = own.clone();
+fn law_schema(schema: &Schema) -> Schema {
+    let mut merged = schema.clone();
     let extras = schema_for!(LawExtras);
     for part in ["properties", "$defs"] {
         let Some(Json::Object(added)) = extras.get(part) else { continue };
@@ -208,21 +208,21 @@ pub fn sections() -> Vec<Section> {
     let law = |name: &&'static str| {
         Some(Section { header: "[law.NAME]", name: Some(name), schema: law_schema(&AnyLaw::schema(name)?) })
     };
-    let mut all = vec![
+    let mut sections = vec![
         plain::<SceneTable>("[scene]"),
         plain::<RunTable>("[run]"),
         plain::<ParticipantTable>("[participant.NAME]"),
     ];
-    all.extend(AnyLaw::NAMES.iter().filter_map(law));
-    all.push(plain::<BodyTable>("[body.NAME]"));
-    all.extend([plain::<TieTable>("[tie.NAME]"), plain::<SurfaceTable>("[surface.NAME]")]);
-    all.extend(typed::<ConstraintTable>("[constraint.NAME]"));
-    all.extend(typed::<LoadTable>("[load.NAME]"));
-    all.extend([plain::<ToolTable>("[obstacle.NAME]"), plain::<ToolTable>("[tool.NAME]")]);
-    all.push(plain::<ContactTable>("[contact.NAME]"));
-    all.extend(typed::<OutputTable>("[output.NAME]"));
-    all.push(plain::<ViewTable>("[view]"));
-    all
+    sections.extend(AnyLaw::NAMES.iter().filter_map(law));
+    sections.push(plain::<BodyTable>("[body.NAME]"));
+    sections.extend([plain::<TieTable>("[tie.NAME]"), plain::<SurfaceTable>("[surface.NAME]")]);
+    sections.extend(typed::<ConstraintTable>("[constraint.NAME]"));
+    sections.extend(typed::<LoadTable>("[load.NAME]"));
+    sections.extend([plain::<ToolTable>("[obstacle.NAME]"), plain::<ToolTable>("[tool.NAME]")]);
+    sections.push(plain::<ContactTable>("[contact.NAME]"));
+    sections.extend(typed::<OutputTable>("[output.NAME]"));
+    sections.push(plain::<ViewTable>("[view]"));
+    sections
 }
 
 /// The JSON schema of a whole scene file.
@@ -323,13 +323,13 @@ mod tests {
 
     #[test]
     fn every_name_leads_to_a_schema() {
-        fn all<T: Typed>() {
+        fn assert_schemas<T: Typed>() {
             assert!(T::NAMES.iter().all(|name| T::schema(name).is_some()), "{}", T::WHAT);
             assert!(T::schema("nonsense").is_none());
         }
-        all::<ConstraintTable>();
-        all::<LoadTable>();
-        all::<OutputTable>();
+        assert_schemas::<ConstraintTable>();
+        assert_schemas::<LoadTable>();
+        assert_schemas::<OutputTable>();
     }
 
     /// Lines of TOML between backticks in the descriptions of a schema: their number, and the lines that the
@@ -349,21 +349,24 @@ mod tests {
         }
         const TELLING: [&str; 6] = ["type", "$ref", "oneOf", "anyOf", "enum", "const"];
         let takes = |schema: &Json, node: &Node| {
-            let Json::Object(own) = schema else { return false };
+            let Json::Object(object) = schema else { return false };
             // A table of schemas is not a schema itself.
-            if !TELLING.iter().any(|key| own.get(*key).is_some_and(|told| !told.is_object())) {
+            if !TELLING.iter().any(|key| object.get(*key).is_some_and(|value| !value.is_object())) {
                 return false;
             }
-            let mut own = own.clone();
-            own.insert("$defs".into(), scene["$defs"].clone());
+            let mut object = object.clone();
+            object.insert("$defs".into(), scene["$defs"].clone());
             let mut errors = Vec::new();
-            check(node, "", &Schema::from(own), &mut errors);
+            check(node, "", &Schema::from(object), &mut errors);
             !errors.iter().any(Diagnostic::is_error)
         };
         let mut keys: BTreeMap<&str, Vec<&Json>> = BTreeMap::new();
         visit(scene, &[], &mut |chain| {
             let properties = chain[0].get("properties").and_then(Json::as_object);
-            properties.into_iter().flatten().for_each(|(key, own)| keys.entry(key).or_default().push(own));
+            properties
+                .into_iter()
+                .flatten()
+                .for_each(|(key, schema)| keys.entry(key).or_default().push(schema));
         });
         let (mut tried, mut refused) = (0, Vec::new());
         visit(scene, &[], &mut |chain| {
@@ -379,9 +382,9 @@ mod tests {
                 let is_taken = Source::parse("reference", text).is_ok_and(|source| {
                     source.root().entries().iter().all(|(key, node)| match is_value {
                         true => chain.iter().any(|schema| takes(schema, node)),
-                        false => {
-                            keys.get(key.as_str()).is_some_and(|all| all.iter().any(|own| takes(own, node)))
-                        }
+                        false => keys
+                            .get(key.as_str())
+                            .is_some_and(|schemas| schemas.iter().any(|schema| takes(schema, node))),
                     })
                 });
                 if !is_taken {

@@ -57,7 +57,7 @@ pub struct Scene {
     /// Warnings about single values.
     pub doubts: Vec<Diagnostic>,
     /// Name of the participant's table that the run comes from, in the scene of one participant.
-    pub own: Option<String>,
+    pub participant: Option<String>,
     /// True if it is the scene of one participant of several.
     pub is_part: bool,
 }
@@ -206,7 +206,7 @@ impl Scene {
                 outputs,
                 view,
                 doubts: out,
-                own: None,
+                participant: None,
                 is_part: false,
             }),
             _ => Err(source.errors(out)),
@@ -255,7 +255,7 @@ fn read_all<T>(
         );
         return Vec::new();
     }
-    let mut all = Vec::new();
+    let mut found = Vec::new();
     for (name, node) in tables.entries() {
         if !check_name(&format!("`[{kind}.NAME]`"), name, node, out) {
             continue;
@@ -267,10 +267,10 @@ fn read_all<T>(
             continue;
         }
         if let Some(table) = read(source, &[kind, name], out) {
-            all.push((name.clone(), table));
+            found.push((name.clone(), table));
         }
     }
-    all
+    found
 }
 
 /// Sorts tables by their names, so that the order of bodies and contacts in the file changes no digit.

@@ -39,14 +39,14 @@ impl Scene {
 
     /// Fields that colours can show on a body or a carried surface, or on all bodies together.
     pub fn fields_on(&self, on: Option<&str>) -> Vec<FieldName> {
-        let all = FieldName::ALL.into_iter();
+        let fields = FieldName::ALL.into_iter();
         match self.carrier(on) {
             Some((_, BodyModel::Shell)) => vec![FieldName::Displacement],
-            Some((_, model)) => all.filter(|field| field.is_of(model) && field.is_of_surface()).collect(),
+            Some((_, model)) => fields.filter(|field| field.is_of(model) && field.is_of_surface()).collect(),
             None => {
                 let shown = self.bodies.iter().filter(|(name, _)| on.is_none_or(|on| on == name));
                 let models: Vec<BodyModel> = shown.map(|(_, body)| body.model).collect();
-                all.filter(|field| models.iter().any(|&model| field.is_of(model))).collect()
+                fields.filter(|field| models.iter().any(|&model| field.is_of(model))).collect()
             }
         }
     }
@@ -74,8 +74,8 @@ impl Scene {
         for (name, output) in &self.outputs {
             let OutputTable::Csv(table) = output else { continue };
             for (probe, place) in &table.probes {
-                let own = if probes.contains_key(probe) { format!("{name}.{probe}") } else { probe.clone() };
-                probes.insert(own, place.clone());
+                let key = if probes.contains_key(probe) { format!("{name}.{probe}") } else { probe.clone() };
+                probes.insert(key, place.clone());
             }
         }
         CsvTable { every: 1.0, reactions: None, moments_about: None, energy: true, probes }

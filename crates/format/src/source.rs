@@ -280,8 +280,8 @@ impl Source {
     /// byte; `None` if there is no such value.
     pub fn key_at(&self, byte: usize) -> Option<String> {
         fn smallest(node: &Node, path: &str, byte: usize, found: &mut Option<(usize, String)>) {
-            let own = if let Place::File(span) = &node.place { Some(span) } else { None };
-            for span in own.into_iter().chain(&node.key_span) {
+            let value_span = if let Place::File(span) = &node.place { Some(span) } else { None };
+            for span in value_span.into_iter().chain(&node.key_span) {
                 let is_smaller = found.as_ref().is_none_or(|(length, _)| span.len() <= *length);
                 if span.contains(&byte) && is_smaller && !path.is_empty() {
                     *found = Some((span.len(), path.to_owned()));
@@ -563,9 +563,9 @@ fn node_of(
 /// True if a key is given twice only because its table is given twice.
 fn repeats_table(table: &Diagnostic, key: &Diagnostic, text: &str) -> bool {
     let twice = |diagnostic: &Diagnostic| diagnostic.message.ends_with(GIVEN_TWICE);
-    let (Some(header), Some(own)) = (&table.span, &key.span) else { return false };
+    let (Some(header), Some(repeated)) = (&table.span, &key.span) else { return false };
     let line_start = text[..header.start].rfind('\n').map_or(0, |at| at + 1);
-    let within = text.get(line_start..own.start).unwrap_or_default();
+    let within = text.get(line_start..repeated.start).unwrap_or_default();
     let headers = within.lines().filter(|line| line.trim_start().starts_with('[')).count();
     twice(table) && twice(key) && within.trim_start().starts_with('[') && headers == 1
 }

@@ -232,8 +232,8 @@ impl<'s> Forms<'s> {
         }
         form.absorb(map);
         let mut forms = vec![form];
-        let all = map.get("allOf").and_then(Json::as_array).into_iter().flatten();
-        for part in self.target(map).into_iter().chain(all) {
+        let parts = map.get("allOf").and_then(Json::as_array).into_iter().flatten();
+        for part in self.target(map).into_iter().chain(parts) {
             forms = forms.into_iter().flat_map(|form| self.resolve(part, form, depth + 1)).collect();
         }
         for key in ["anyOf", "oneOf"] {
@@ -253,12 +253,12 @@ impl<'s> Forms<'s> {
 
     /// The first paragraph of a schema's description, or of the schema to which it refers.
     pub(crate) fn doc(self, schema: &'s Json) -> Option<&'s str> {
-        let own = |schema: &'s Json| schema.get("description")?.as_str()?.split("\n\n").next();
-        own(schema).or_else(|| {
+        let first_paragraph = |schema: &'s Json| schema.get("description")?.as_str()?.split("\n\n").next();
+        first_paragraph(schema).or_else(|| {
             let map = schema.as_object()?;
             let branch = map.get("anyOf").and_then(Json::as_array).and_then(|branches| branches.first());
             let optional = branch.and_then(Json::as_object).filter(|branch| branch.contains_key("$ref"));
-            self.target(map).or_else(|| self.target(optional?)).and_then(own)
+            self.target(map).or_else(|| self.target(optional?)).and_then(first_paragraph)
         })
     }
 

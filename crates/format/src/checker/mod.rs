@@ -424,17 +424,17 @@ impl<'s> Checker<'s, '_> {
         if let Some(tag) = tag {
             return self.tagged(node, forms, tag, trail);
         }
-        let own: Vec<Vec<&str>> = forms
+        let distinct: Vec<Vec<&str>> = forms
             .iter()
             .map(|form| form.properties.iter().map(|(key, _)| *key).filter(|key| !common(key)).collect())
             .collect();
-        let told_by_key = forms.iter().zip(&own).all(|(form, own)| match own.as_slice() {
+        let told_by_key = forms.iter().zip(&distinct).all(|(form, keys)| match keys.as_slice() {
             [] => true,
             [key] => form.required.contains(key),
             _ => false,
         });
         if told_by_key {
-            self.keyed(node, forms, &own, words, trail)
+            self.keyed(node, forms, &distinct, words, trail)
         } else {
             self.best(node, forms, trail, doc)
         }
@@ -462,27 +462,27 @@ impl<'s> Checker<'s, '_> {
         self.report(Diagnostic::error(message).at(given.place.clone(), "not known here").help(hint))
     }
 
-    /// `own` has the keys of each form that not all forms have, at most one for each form.
+    /// `distinct` has the keys of each form that not all forms have, at most one for each form.
     fn keyed(
         &mut self,
         node: &Node,
         forms: &[Form<'s>],
-        own: &[Vec<&'s str>],
+        distinct: &[Vec<&'s str>],
         words: &[&str],
         trail: &Trail<'_>,
     ) -> Option<Json> {
         let entries = node.entries();
-        let choices: Vec<&'s str> = own.iter().flatten().copied().collect();
+        let choices: Vec<&'s str> = distinct.iter().flatten().copied().collect();
         let given: Vec<&(String, Node)> =
             entries.iter().filter(|(key, _)| choices.contains(&key.as_str())).collect();
         let exactly = format!("give exactly one of {}", names(&choices));
         match given.as_slice() {
             [(key, _)] => {
-                let form = own.iter().position(|own| own.contains(&key.as_str()))?;
+                let form = distinct.iter().position(|keys| keys.contains(&key.as_str()))?;
                 self.table(node, entries, &forms[form], &[], trail)
             }
             [] => {
-                if let Some(form) = own.iter().position(Vec::is_empty) {
+                if let Some(form) = distinct.iter().position(Vec::is_empty) {
                     return self.table(node, entries, &forms[form], &choices, trail);
                 }
                 let unknown = |key: &str| forms[0].property(key).is_none() && !self.skipped(key, trail);
