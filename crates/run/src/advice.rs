@@ -65,14 +65,14 @@ pub(crate) fn remedy(failure: &Failure, part: &PlannedParticipant, now: &dyn Ins
 /// Advice to limit the force of moving tools that touch these bodies and have no limit; empty without such
 /// tools.
 fn pushing(part: &PlannedParticipant, now: &dyn Instant) -> String {
-    let Some(all) = &part.built.contacts else { return String::new() };
+    let Some(contacts) = &part.built.contacts else { return String::new() };
     let unlimited = |contact: &Contact| {
         let With::Rigid(number) = contact.with else { return None };
-        let rigid = &all.rigids[number];
+        let rigid = &contacts.rigids[number];
         let moves = rigid.trajectory.moves() || now.leg(number).is_some();
         (moves && rigid.trajectory.limit().is_none()).then(|| format!("`{}`", rigid.tool()))
     };
-    let mut tools: Vec<String> = all.contacts.iter().filter_map(unlimited).collect();
+    let mut tools: Vec<String> = contacts.contacts.iter().filter_map(unlimited).collect();
     tools.dedup();
     match tools.is_empty() {
         true => String::new(),

@@ -270,9 +270,9 @@ impl Origin {
 
     /// Returns the compared parts with their fingerprints.
     fn parts(&self) -> Vec<(String, u64)> {
-        let own = self.participants.iter().flat_map(|own| &own.parts);
-        let names: Vec<&String> = self.participants.iter().map(|own| &own.name).collect();
-        let mut parts: Vec<_> = own.chain(&self.tables).cloned().collect();
+        let of_participants = self.participants.iter().flat_map(|participant| &participant.parts);
+        let names: Vec<&String> = self.participants.iter().map(|participant| &participant.name).collect();
+        let mut parts: Vec<_> = of_participants.chain(&self.tables).cloned().collect();
         parts.push(("the list of participants".into(), fingerprint(&names)));
         parts
     }
@@ -281,23 +281,23 @@ impl Origin {
     fn check(&self, world: &World) -> Result<(), ResumeError> {
         let now = Self::of(world);
         let pairs = now.participants.iter().zip(&self.participants);
-        for (own, before) in pairs.filter(|(own, before)| own.name == before.name) {
-            if own.precision != before.precision {
-                let [checkpoint, scene] = [before.precision, own.precision].map(Precision::word);
+        for (current, before) in pairs.filter(|(current, before)| current.name == before.name) {
+            if current.precision != before.precision {
+                let [checkpoint, scene] = [before.precision, current.precision].map(Precision::word);
                 return Err(ResumeError::OtherPrecision { checkpoint, scene });
             }
-            if own.solver != before.solver {
-                let [checkpoint, scene] = [before.solver, own.solver].map(SolverName::word);
+            if current.solver != before.solver {
+                let [checkpoint, scene] = [before.solver, current.solver].map(SolverName::word);
                 return Err(ResumeError::OtherSolver { checkpoint, scene });
             }
         }
-        let (own, before) = (now.parts(), self.parts());
-        if own != before {
+        let (current, before) = (now.parts(), self.parts());
+        if current != before {
             let differ = |a: &[(String, u64)], b: &[(String, u64)]| -> Vec<String> {
                 a.iter().filter(|part| !b.contains(part)).map(|part| part.0.clone()).collect()
             };
-            let mut parts = differ(&own, &before);
-            parts.extend(differ(&before, &own));
+            let mut parts = differ(&current, &before);
+            parts.extend(differ(&before, &current));
             let mut seen = std::collections::HashSet::new();
             parts.retain(|part| seen.insert(part.clone()));
             let until = (now.until != self.until).then_some(self.until);
@@ -338,8 +338,12 @@ impl Checkpoint {
         };
         let mut file = path.to_owned();
         if path.is_dir() {
-            let all = checkpoints_in(path).map_err(|error| unreadable(path, error))?;
-            file = all.into_iter().last().ok_or_else(|| ResumeError::NoneIn { path: path.to_owned() })?.1;
+            let checkpoints = checkpoints_in(path).map_err(|error| unreadable(path, error))?;
+            file = checkpoints
+                .into_iter()
+                .last()
+                .ok_or_else(|| ResumeError::NoneIn { path: path.to_owned() })?
+                .1;
         }
         let bytes = read_limited(&file, u64::MAX).map_err(|error| unreadable(&file, error))?;
         Self::from_bytes(&file, &bytes)
@@ -403,7 +407,7 @@ impl Checkpoint {
 
     /// The time [s] between common instants.
     fn step(&self) -> f64 {
-        self.origin.participants.iter().map(|own| own.step).fold(0.0, f64::max)
+        self.origin.participants.iter().map(|participant| participant.step).fold(0.0, f64::max)
     }
 
     /// True if a run that ends at a time [s] has no step left: only its last instant may still have to be
@@ -430,10 +434,10 @@ impl Checkpoint {
         }
         let mut world = world.clone();
         let common = (until / step - 1e-9).ceil().max(1.0) as u64;
-        for (part, own) in world.participants.iter_mut().zip(&self.origin.participants) {
+        for (part, origin) in world.participants.iter_mut().zip(&self.origin.participants) {
             if part.plan.steps.ends.is_none() {
-                let ratio = (step / own.step).round().max(1.0) as u64;
-                (part.plan.steps.step, part.plan.steps.number) = (own.step, common * ratio);
+                let ratio = (step / origin.step).round().max(1.0) as u64;
+                (part.plan.steps.step, part.plan.steps.number) = (origin.step, common * ratio);
             }
         }
         Ok(world)
@@ -463,8 +467,8 @@ impl Checkpoint {
         let parts = &world.participants;
         let constraints: usize = parts.iter().map(|part| part.built.model.constraints.len()).sum();
         let history = &progressed.history;
-        let all = parts.iter().flat_map(|part| &part.built.model.constraints);
-        let filled = all.filter(|own| own.motion.encloses()).count();
+        let listed = parts.iter().flat_map(|part| &part.built.model.constraints);
+        let filled = listed.filter(|constraint| constraint.motion.encloses()).count();
         let whole = history.reactions.iter().all(|row| row.len() == constraints)
             && history.enclosed.len() == filled * history.times.len()
             && progressed.watched.len() == parts.len()
@@ -505,9 +509,10 @@ impl<'a> Checkpoints<'a> {
     /// Removes checkpoints later than a number of steps.
     pub(crate) fn remove_after(&self, steps: u64) -> Result<(), OutputError> {
         let folder = self.folder.path();
-        let all = checkpoints_in(folder).map_err(|error| OutputError::new(folder, error))?;
-        all.iter()
-            .filter(|(own, _)| *own > steps)
+        let checkpoints = checkpoints_in(folder).map_err(|error| OutputError::new(folder, error))?;
+        checkpoints
+            .iter()
+            .filter(|(taken, _)| *taken > steps)
             .try_for_each(|(_, later)| fs::remove_file(later).map_err(|error| OutputError::new(later, error)))
     }
 
@@ -559,14 +564,14 @@ pub(crate) fn steps_of(name: &str) -> Option<u64> {
 
 /// The checkpoints in a folder with their steps, in order.
 fn checkpoints_in(folder: &Path) -> std::io::Result<Vec<(u64, PathBuf)>> {
-    let mut all = Vec::new();
+    let mut found = Vec::new();
     for entry in fs::read_dir(folder)? {
         let path = entry?.path();
         let steps = path.file_name().and_then(|name| steps_of(name.to_str()?));
-        all.extend(steps.map(|steps| (steps, path)));
+        found.extend(steps.map(|steps| (steps, path)));
     }
-    all.sort();
-    Ok(all)
+    found.sort();
+    Ok(found)
 }
 
 #[cfg(test)]

@@ -14,8 +14,8 @@ use crate::output::{FieldMesh, frames};
 /// If there is no such field.
 pub fn field_named(name: &str) -> Result<FieldName, Failure> {
     FieldName::ALL.into_iter().find(|field| field.name() == name).ok_or_else(|| {
-        let all: Vec<&str> = FieldName::ALL.iter().map(|field| field.name()).collect();
-        Failure::input(&format_args!("there is no field `{name}`; known fields: {}", all.join(", ")))
+        let names: Vec<&str> = FieldName::ALL.iter().map(|field| field.name()).collect();
+        Failure::input(&format_args!("there is no field `{name}`; known fields: {}", names.join(", ")))
     })
 }
 
@@ -68,8 +68,8 @@ impl FieldReader {
         match (found.next(), found.next()) {
             (Some(only), None) => Ok(Cow::Borrowed(&only.values)),
             (Some(first), Some(second)) => {
-                let all = [first, second].into_iter().chain(found);
-                Ok(Cow::Owned(all.flat_map(|data| &data.values).copied().collect()))
+                let arrays = [first, second].into_iter().chain(found);
+                Ok(Cow::Owned(arrays.flat_map(|data| &data.values).copied().collect()))
             }
             (None, _) => Err(Failure::input(&format_args!("this body has no field `{name}`"))),
         }

@@ -208,7 +208,9 @@ impl Live {
                 ways.extend(around.map(|corner| (motion * Point3::from(corner)).coords));
             }
             for model in parts.iter().map(|part| &part.built.model) {
-                for constraint in model.constraints.iter().filter(|own| !own.motion.is_collective()) {
+                for constraint in
+                    model.constraints.iter().filter(|constraint| !constraint.motion.is_collective())
+                {
                     let place = |(index, &node): (usize, &u32)| {
                         let moved = Vector3::from(constraint.motion.displacement(index, time, 1.0));
                         let is_driven = |axis: usize| f64::from(u8::from(constraint.components[axis]));
@@ -372,8 +374,8 @@ mod tests {
             let node = model(&with("young-modulus = 10e3")).node_count() - 1;
             let now = live.simulation.instants().next().unwrap();
             let last = match now.displacements().unwrap() {
-                Reals::Single(all) => all[node].map(f64::from),
-                Reals::Double(all) => all[node],
+                Reals::Single(values) => values[node].map(f64::from),
+                Reals::Double(values) => values[node],
             };
             assert_eq!(
                 (last, precision),

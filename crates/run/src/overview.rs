@@ -73,9 +73,9 @@ fn write_model(page: &mut String, built: &Built) -> fmt::Result {
     for constraint in &built.model.constraints {
         write_constraint(page, constraint)?;
     }
-    for contact in built.contacts.iter().flat_map(|all| &all.contacts) {
+    for contact in built.contacts.iter().flat_map(|contacts| &contacts.contacts) {
         let thing = match (&contact.with, &built.contacts) {
-            (With::Rigid(rigid), Some(all)) => format!("`{}`", all.rigids[*rigid].name),
+            (With::Rigid(rigid), Some(contacts)) => format!("`{}`", contacts.rigids[*rigid].name),
             (With::Body(other), _) => format!("{} of another body", counted(other.nodes.len(), "node")),
             _ => "each other".into(),
         };

@@ -85,9 +85,9 @@ impl Sweep {
         let failed = |error: io::Error| OutputError::new(&path, error);
         fs::create_dir_all(folder).map_err(|error| OutputError::new(folder, error))?;
         let (file, lines) = open_rows(&path).map_err(failed)?;
-        let own: Vec<usize> = (part.number - 1..self.runs()).step_by(part.of).collect();
+        let assigned: Vec<usize> = (part.number - 1..self.runs()).step_by(part.of).collect();
         let known: BTreeMap<usize, Json> = self.known(&lines).collect();
-        let left: Vec<usize> = own.iter().copied().filter(|run| !known.contains_key(run)).collect();
+        let left: Vec<usize> = assigned.iter().copied().filter(|run| !known.contains_key(run)).collect();
         let rows = Mutex::new((file, Vec::new(), None));
         in_parallel(left.len(), options.threads, options.stop, |index| {
             let row = self.run_one(left[index], folder, options, &mut |_| {});
@@ -111,7 +111,7 @@ impl Sweep {
         }
         failures.sort_unstable();
         let interrupted = options.stop.is_some_and(pliant_sim::StopFlag::is_asked);
-        Ok(PartSummary { rows: path, runs: own.len(), known: known.len(), failures, interrupted })
+        Ok(PartSummary { rows: path, runs: assigned.len(), known: known.len(), failures, interrupted })
     }
 
     /// Puts the parts in a folder together into the table of the sweep.

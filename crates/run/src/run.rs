@@ -107,8 +107,8 @@ pub fn run_with(
 /// Writes the plot and the page that shows it.
 fn write_pages(world: &World, folder: &OutputFolder, outcome: &mut Outcome) -> Result<(), OutputError> {
     let page = folder.path().join(SUMMARY);
-    for (part, own) in world.participants.iter().zip(&outcome.parts) {
-        let Some(table) = &own.convergence else { continue };
+    for (part, result) in world.participants.iter().zip(&outcome.parts) {
+        let Some(table) = &result.convergence else { continue };
         let file = part.prefix().map_or(CONVERGENCE.to_owned(), |name| format!("convergence-{name}.csv"));
         outcome.files.push(folder.write(&file, table)?);
         if let Some(failure) = outcome
@@ -272,7 +272,7 @@ impl<'a, 'env> Run<'a, 'env> {
             time: simulation.time(),
             wall_seconds,
             energies: simulation.energies(),
-            parts: parts.map(|((part, own), watched)| PartOutcome::new(part, own, watched)).collect(),
+            parts: parts.map(|((part, now), watched)| PartOutcome::new(part, now, watched)).collect(),
             ties: simulation.ties().map(|tie| TieSummary::new(world, tie)).collect(),
             guests: simulation.coupled_surfaces().map(|now| CoupledSurfaceSummary::new(world, now)).collect(),
             ended: simulation.ended().map(ToOwned::to_owned),
@@ -371,10 +371,10 @@ impl<'a, 'env> Run<'a, 'env> {
 
     fn look_at_strains(&mut self, simulation: &Simulation, solids: bool) {
         let parts = self.world.participants.iter().zip(simulation.instants());
-        for (own, (part, now)) in self.watched.iter_mut().zip(parts) {
-            own.strains.look(&part.built, now.shells());
+        for (watched, (part, now)) in self.watched.iter_mut().zip(parts) {
+            watched.strains.look(&part.built, now.shells());
             if solids {
-                own.solids.look(&part.built.model, now);
+                watched.solids.look(&part.built.model, now);
             }
         }
     }
@@ -382,8 +382,8 @@ impl<'a, 'env> Run<'a, 'env> {
     /// A failure with a remedy that knows the run.
     fn advised(&self, failure: Failure, simulation: &Simulation) -> Failure {
         let mut parts = self.world.participants.iter().zip(simulation.instants());
-        let own = parts.find(|(part, _)| failure.body.as_ref().is_none_or(|body| part.scene.has(body)));
-        match own.and_then(|(part, now)| remedy(&failure, part, now)) {
+        let failed = parts.find(|(part, _)| failure.body.as_ref().is_none_or(|body| part.scene.has(body)));
+        match failed.and_then(|(part, now)| remedy(&failure, part, now)) {
             Some(remedy) => failure.advised(&remedy),
             None => failure,
         }
@@ -433,7 +433,7 @@ impl Observer for Run<'_, '_> {
     fn see(&mut self, simulation: &Simulation, last: bool) -> Result<(), Failure> {
         let (time, step) = (simulation.time(), simulation.step_length());
         let parts = self.world.participants.iter().zip(simulation.instants());
-        self.watched.iter_mut().zip(parts).for_each(|(own, (part, now))| own.see(part, now));
+        self.watched.iter_mut().zip(parts).for_each(|(watched, (part, now))| watched.see(part, now));
         if self.sampling.is_due(time, step, last) {
             self.history.sample(&frames(self.world, simulation));
             // A GPU brings states back at the end.
@@ -442,8 +442,8 @@ impl Observer for Run<'_, '_> {
         }
         if last || self.outputs.are_due(time, step, last) {
             let parts = self.world.participants.iter().zip(simulation.instants());
-            for ((own, check), (part, now)) in self.watched.iter_mut().zip(&self.checks).zip(parts) {
-                check.iter().for_each(|check| own.intersections.look(check, part, now));
+            for ((watched, check), (part, now)) in self.watched.iter_mut().zip(&self.checks).zip(parts) {
+                check.iter().for_each(|check| watched.intersections.look(check, part, now));
             }
         }
         self.outputs.see(simulation, last)?;
@@ -458,7 +458,8 @@ impl Observer for Run<'_, '_> {
         if self.rollback.as_ref().is_some_and(|points| points.is_due(simulation)) {
             self.keep_point(simulation)?;
         }
-        let due = self.checkpoints.as_mut().is_some_and(|all| all.is_due(time, step, last || stop));
+        let due =
+            self.checkpoints.as_mut().is_some_and(|checkpoints| checkpoints.is_due(time, step, last || stop));
         if due {
             self.write_checkpoint(simulation)?;
         }

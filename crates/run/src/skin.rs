@@ -89,7 +89,7 @@ impl Skin {
         let mut nodes: Vec<(u32, f64)> = Vec::new();
         for (vertex, weight) in held {
             nodes.extend(
-                self.nodes_of(simulation, vertex).into_iter().map(|(node, own)| (node, own * weight)),
+                self.nodes_of(simulation, vertex).into_iter().map(|(node, share)| (node, share * weight)),
             );
         }
         nodes.sort_by_key(|(node, _)| *node);
@@ -149,8 +149,8 @@ impl Skin {
             let (u, v) = ([b[0] - a[0], b[1] - a[1], b[2] - a[2]], [c[0] - a[0], c[1] - a[1], c[2] - a[2]]);
             let area = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
             for &vertex in triangle {
-                let own = &mut normals[vertex as usize];
-                (0..3).for_each(|c| own[c] += area[c]);
+                let sum = &mut normals[vertex as usize];
+                (0..3).for_each(|c| sum[c] += area[c]);
             }
         }
         for normal in normals {

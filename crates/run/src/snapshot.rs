@@ -47,7 +47,7 @@ pub fn snapshot_from_bytes(world: &Setup, bytes: &[u8]) -> Result<SimulationStat
         return refused("has no snapshot header: the bytes are something else");
     }
     let number = |at: usize| bytes.get(at..at + 8)?.try_into().ok().map(u64::from_le_bytes);
-    let format = bytes.get(8..12).and_then(|own| own.try_into().ok()).map_or(0, u32::from_le_bytes);
+    let format = bytes.get(8..12).and_then(|field| field.try_into().ok()).map_or(0, u32::from_le_bytes);
     if format != FORMAT {
         return refused(&format!("has format {format}; this version reads format {FORMAT}"));
     }

@@ -146,15 +146,15 @@ impl Sweep {
     /// The key and value of each assignment of a combination. The last key changes fastest.
     pub fn combination(&self, run: usize) -> Vec<(&str, &str)> {
         let mut rest = run;
-        let mut all: Vec<_> = (self.axes.iter().rev())
+        let mut assignments: Vec<_> = (self.axes.iter().rev())
             .map(|axis| {
                 let value = &axis.values[rest % axis.values.len()];
                 rest /= axis.values.len();
                 (axis.key.as_str(), value.as_str())
             })
             .collect();
-        all.reverse();
-        all
+        assignments.reverse();
+        assignments
     }
 
     /// A combination in words: `a=1 b=2`.
@@ -204,11 +204,12 @@ impl Sweep {
         let entries = fs::read_dir(&path).map_err(|error| OutputError::new(&path, error))?;
         for entry in entries.flatten() {
             let name = entry.file_name().to_string_lossy().into_owned();
-            let own = name.strip_prefix("run-").is_some_and(|n| n.bytes().all(|byte| byte.is_ascii_digit()));
-            if own {
+            let is_run =
+                name.strip_prefix("run-").is_some_and(|n| n.bytes().all(|byte| byte.is_ascii_digit()));
+            if is_run {
                 check_own_folder(&entry.path()).map_err(|error| OutputError::new(&entry.path(), error))?;
             }
-            if own && entry.path().is_dir() {
+            if is_run && entry.path().is_dir() {
                 OutputFolder::clear(&entry.path(), &scene)?;
             }
         }
@@ -422,8 +423,9 @@ fn reactions(scene: &Scene, folder: &Path) -> Reactions {
             .map(|line| line.split(',').map(|cell| cell.parse().unwrap_or(f64::NAN)).collect())
             .collect();
         let column = |name: &str| header.iter().position(|known| *known == name);
-        let own = header.iter().filter_map(|column| column.strip_prefix("reaction.")?.strip_suffix(".x"));
-        let sizes = own.filter_map(|constraint| {
+        let constraints =
+            header.iter().filter_map(|column| column.strip_prefix("reaction.")?.strip_suffix(".x"));
+        let sizes = constraints.filter_map(|constraint| {
             let columns = AXES.map(|axis| column(&format!("reaction.{constraint}.{axis}")));
             let [Some(x), Some(y), Some(z)] = columns else { return None };
             let at = |row: &Vec<f64>, column: usize| row.get(column).copied().unwrap_or(f64::NAN);
@@ -440,21 +442,21 @@ fn reactions(scene: &Scene, folder: &Path) -> Reactions {
 
 /// The last row of the probes in a run's tables; the columns begin with the name of the output.
 fn final_probes(scene: &Scene, folder: &Path) -> Vec<(String, String)> {
-    let mut all = Vec::new();
+    let mut found = Vec::new();
     for (name, text) in tables(scene, folder) {
         let (Some(header), Some(last)) = (text.lines().next(), text.lines().last()) else { continue };
         let columns = header.split(',').zip(last.split(','));
         let probes = columns.filter(|(column, _)| column.starts_with("probe."));
-        all.extend(probes.map(|(column, value)| (format!("{name}.{column}"), value.to_owned())));
+        found.extend(probes.map(|(column, value)| (format!("{name}.{column}"), value.to_owned())));
     }
-    all
+    found
 }
 
 fn distinct<'a>(names: impl Iterator<Item = &'a String>) -> Vec<&'a String> {
-    let mut all = Vec::new();
+    let mut kept = Vec::new();
     let mut seen = std::collections::HashSet::new();
-    all.extend(names.filter(|name| seen.insert(*name)));
-    all
+    kept.extend(names.filter(|name| seen.insert(*name)));
+    kept
 }
 
 /// A cell of a table, in quotes where it needs some (RFC 4180).

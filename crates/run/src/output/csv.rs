@@ -78,7 +78,7 @@ impl Samples {
         if self.total {
             row.extend(in_columns(&Energies::total(frames.iter().map(|frame| frame.now.energies()))));
         }
-        self.parts.iter_mut().zip(frames).for_each(|(own, frame)| own.read(frame, row));
+        self.parts.iter_mut().zip(frames).for_each(|(part, frame)| part.read(frame, row));
     }
 }
 
@@ -161,7 +161,7 @@ impl Columns {
             add(format!("volume.{name}"), "m³");
             add(format!("pressure.{name}"), "Pa");
         }
-        let contacts = built.contacts.as_ref().map_or(&[][..], |all| &all.contacts);
+        let contacts = built.contacts.as_ref().map_or(&[][..], |contacts| &contacts.contacts);
         let paired: Vec<usize> =
             (0..contacts.len()).filter(|&at| !matches!(contacts[at].with, With::Itself)).collect();
         for contact in paired.iter().map(|&at| &contacts[at]) {
@@ -219,10 +219,10 @@ impl Columns {
             // No forces exist before the first evaluation.
             let force = |at: &usize| forces.get(*at).copied().unwrap_or_default();
             self.contacts.iter().for_each(|at| row.extend(force(at)));
-            self.things.iter().for_each(|all| row.extend(all.iter().map(force).fold([0.0; 3], add)));
+            self.things.iter().for_each(|indices| row.extend(indices.iter().map(force).fold([0.0; 3], add)));
         }
         for (point, held) in
-            self.moments.iter().flat_map(|(point, all)| all.iter().map(move |held| (point, held)))
+            self.moments.iter().flat_map(|(point, holders)| holders.iter().map(move |held| (point, held)))
         {
             row.extend(held.moment(frame, *point));
         }
@@ -257,10 +257,10 @@ impl Columns {
 /// Tools and obstacles with several contacts, by name.
 fn several_contacts(built: &Built) -> Vec<(&str, Vec<usize>)> {
     let mut things: Vec<(&str, Vec<usize>)> = Vec::new();
-    let Some(all) = &built.contacts else { return things };
-    for (contact, at) in all.contacts.iter().zip(0..) {
+    let Some(touching) = &built.contacts else { return things };
+    for (contact, at) in touching.contacts.iter().zip(0..) {
         let With::Rigid(rigid) = contact.with else { continue };
-        let name = all.rigids[rigid].tool();
+        let name = touching.rigids[rigid].tool();
         match things.iter_mut().find(|(known, _)| *known == name) {
             Some((_, contacts)) => contacts.push(at),
             None => things.push((name, vec![at])),
@@ -281,11 +281,11 @@ fn held(built: &Built, constraints: &[usize]) -> Vec<Held> {
     let of = |&index: &usize| {
         let constraint = &model.constraints[index];
         let [.., rx, ry, rz] = constraint.components;
-        let own = |node: u32| {
+        let owns = |node: u32| {
             let [x, y, z] = owners[node as usize].map(|owner| owner as usize == index);
             [x, y, z, rx, ry, rz]
         };
-        Held(constraint.nodes.iter().map(|&node| (node, own(node))).collect())
+        Held(constraint.nodes.iter().map(|&node| (node, owns(node))).collect())
     };
     constraints.iter().map(of).collect()
 }
@@ -294,10 +294,10 @@ impl Held {
     /// The moment [N m] of the forces and moments on the nodes about a point [m].
     fn moment(&self, frame: &Frame<'_>, point: [f64; 3]) -> [f64; 3] {
         let mut sum = Vector3::zeros();
-        for &(node, own) in &self.0 {
+        for &(node, owned) in &self.0 {
             let node = node as usize;
             let masked = |value: [f64; 3], first: usize| {
-                Vector3::from_fn(|c, _| if own[first + c] { value[c] } else { 0.0 })
+                Vector3::from_fn(|c, _| if owned[first + c] { value[c] } else { 0.0 })
             };
             let displacement = frame.now.displacement(node);
             let arm = Vector3::from(frame.built().model.rest[node]) + Vector3::from(displacement)
@@ -451,11 +451,11 @@ impl Probe {
             return Self { weights: row.collect(), cell: None, fields };
         }
         let body = built.bodies.iter().position(|body| body.name == table.on).unwrap_or(0);
-        let own = &built.model.bodies[body];
+        let numbered = &built.model.bodies[body];
         let Some(location) = built.bodies[body].locator().locate(&point) else {
             return Self { weights: Vec::new(), cell: None, fields };
         };
-        let weights = location.weights.iter().map(|&(node, weight)| (own.node(node), weight)).collect();
+        let weights = location.weights.iter().map(|&(node, weight)| (numbered.node(node), weight)).collect();
         if let Some(BodyCells::Facets(range)) = built.implicit.as_ref().map(|part| &part.cells[body]) {
             return Self { weights, cell: Some(Place::Facet(range.start + location.cell)), fields };
         }

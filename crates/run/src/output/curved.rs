@@ -33,7 +33,7 @@ impl Curved {
                 .position(|cells| matches!(cells, BodyCells::Facets(r) if r.contains(&facet)));
             on.is_none_or(|on| owner.is_some_and(|owner| built.bodies[owner].name == on))
         };
-        let mut own = vec![u32::MAX; picture.places.len()];
+        let mut renumbered = vec![u32::MAX; picture.places.len()];
         let (mut points, mut facets, mut nodes) = (Vec::new(), Vec::new(), Vec::new());
         let mut edges = Vec::new();
         for (number, triangle) in picture.triangles.iter().enumerate() {
@@ -44,7 +44,7 @@ impl Curved {
             facets.push(facet);
             edges.push(f64::from(picture.facet_edges[number]));
             for &point in triangle {
-                let at = &mut own[point as usize];
+                let at = &mut renumbered[point as usize];
                 if *at == u32::MAX {
                     *at = points.len() as u32;
                     points.push(point);
@@ -125,10 +125,10 @@ impl Curved {
 fn labels_of_facets(built: &Built, part: &ImplicitBodies) -> Vec<f64> {
     let mut labels = vec![0.0; part.model.facets.len()];
     for (body, cells) in built.bodies.iter().zip(&part.cells) {
-        let own = body.mesh.block(CellKind::Triangle).and_then(|block| block.data.get("label"));
-        if let (BodyCells::Facets(range), Some(own)) = (cells, own) {
+        let given = body.mesh.block(CellKind::Triangle).and_then(|block| block.data.get("label"));
+        if let (BodyCells::Facets(range), Some(given)) = (cells, given) {
             let facets = labels[range.start as usize..range.end as usize].iter_mut();
-            facets.zip(&own.values).for_each(|(label, own)| *label = *own);
+            facets.zip(&given.values).for_each(|(label, value)| *label = *value);
         }
     }
     labels

@@ -31,18 +31,23 @@ impl FieldMesh {
         let mut parts = Vec::new();
         let mut first_body = 0;
         for (index, part) in shown {
-            let all =
-                ParticipantMesh::all(&part.built, on, &part.fields(&table.data), table.at, table.curved);
-            parts.extend(all.into_iter().map(|own| (index, ParticipantMesh { first_body, ..own })));
+            let meshes = ParticipantMesh::of_bodies(
+                &part.built,
+                on,
+                &part.fields(&table.data),
+                table.at,
+                table.curved,
+            );
+            parts.extend(meshes.into_iter().map(|mesh| (index, ParticipantMesh { first_body, ..mesh })));
             first_body += part.built.bodies.len();
         }
         if on.is_none() {
             let things = world.participants.iter().enumerate();
             parts.extend(things.filter_map(|(index, part)| {
-                let own = ParticipantMesh::of_things(&part.built, &table.data)?;
-                let own = ParticipantMesh { first_body, ..own };
+                let mesh = ParticipantMesh::of_things(&part.built, &table.data)?;
+                let mesh = ParticipantMesh { first_body, ..mesh };
                 first_body += part.built.rigid_names().count();
-                Some((index, own))
+                Some((index, mesh))
             }));
         }
         let names = world.body_names(on);
@@ -63,10 +68,10 @@ impl FieldMesh {
     /// Returns the participant of a point, the participant's mesh, and the point's number there.
     fn part_of(&self, point: u32) -> Option<(usize, &ParticipantMesh, usize)> {
         let mut point = point as usize;
-        for (index, own) in &self.parts {
-            let points = own.mesh.points.len();
+        for (index, part) in &self.parts {
+            let points = part.mesh.points.len();
             if point < points {
-                return Some((*index, own, point));
+                return Some((*index, part, point));
             }
             point -= points;
         }
@@ -76,20 +81,20 @@ impl FieldMesh {
     /// A point of the mesh as a combination of nodes of a participant; of a curved surface, the combination
     /// under its bulge.
     pub fn nodes_of(&self, world: &World, point: u32) -> (usize, Vec<(u32, f64)>) {
-        let Some((index, own, point)) = self.part_of(point) else { return (0, Vec::new()) };
-        (index, own.nodes_of(&world.participants[index].built, point as u32))
+        let Some((index, part, point)) = self.part_of(point) else { return (0, Vec::new()) };
+        (index, part.nodes_of(&world.participants[index].built, point as u32))
     }
 
     /// The participant and the rigid thing that a point belongs to; `None` of a point of a body.
     pub fn thing_of(&self, point: u32) -> Option<(usize, usize)> {
-        let (index, own, point) = self.part_of(point)?;
-        let Content::Things { owners, .. } = &own.content else { return None };
+        let (index, part, point) = self.part_of(point)?;
+        let Content::Things { owners, .. } = &part.content else { return None };
         Some((index, owners[point] as usize))
     }
 
     /// Displacement of a point of a rigid thing per unit of its growth; zero for a point of a body.
     pub(crate) fn outward_of(&self, point: u32) -> Vector3 {
-        let part = self.part_of(point).map(|(_, own, point)| (&own.content, point));
+        let part = self.part_of(point).map(|(_, part, point)| (&part.content, point));
         match part {
             Some((Content::Things { outward, .. }, point)) => outward[point],
             _ => Vector3::zeros(),
@@ -98,13 +103,13 @@ impl FieldMesh {
 
     /// Takes the fields of an instant.
     pub fn fill(&mut self, frames: &[Frame<'_>]) {
-        self.parts.iter_mut().for_each(|(index, own)| own.fill(&frames[*index]));
+        self.parts.iter_mut().for_each(|(index, part)| part.fill(&frames[*index]));
         self.merge();
     }
 
     fn merge(&mut self) {
         if self.parts.len() > 1 {
-            let meshes: Vec<_> = self.parts.iter().map(|(_, own)| (&own.mesh, own.first_body)).collect();
+            let meshes: Vec<_> = self.parts.iter().map(|(_, part)| (&part.mesh, part.first_body)).collect();
             self.merged = Some(Mesh { body_names: self.names.clone(), ..merged(&meshes) });
         }
     }
@@ -137,19 +142,25 @@ enum Content {
 impl ParticipantMesh {
     /// Makes the mesh of a body or surface by name, or of all bodies, solids before shells. With `curved`,
     /// makes the curved surface of shells.
-    fn all(built: &Built, on: Option<&str>, fields: &[FieldName], at: At, curved: Option<u32>) -> Vec<Self> {
-        let own = |(mesh, content), fields| Self::new(built, on, mesh, content, fields, at);
+    fn of_bodies(
+        built: &Built,
+        on: Option<&str>,
+        fields: &[FieldName],
+        at: At,
+        curved: Option<u32>,
+    ) -> Vec<Self> {
+        let make = |(mesh, content), fields| Self::new(built, on, mesh, content, fields, at);
         let surface = built.model.surfaces.iter().position(|surface| Some(surface.name.as_str()) == on);
         if let Some(index) = surface {
-            return vec![own((bare(&built.surfaces[index]), Content::Surface(index)), fields.to_vec())];
+            return vec![make((bare(&built.surfaces[index]), Content::Surface(index)), fields.to_vec())];
         }
         let of = |models: &[BodyModel]| -> Vec<FieldName> {
             let is_of = |field: &FieldName| models.iter().any(|&model| field.is_of(model));
             fields.iter().copied().filter(is_of).collect()
         };
-        let mut all = Vec::new();
+        let mut meshes = Vec::new();
         if chosen(built, on, false).next().is_some() {
-            all.push(own(merged_bodies(built, on), of(&models(built, on))));
+            meshes.push(make(merged_bodies(built, on), of(&models(built, on))));
         }
         if let Some(part) = &built.implicit
             && chosen(built, on, true).next().is_some()
@@ -161,9 +172,9 @@ impl ParticipantMesh {
                     (mesh, Content::Curved(Box::new(curved)))
                 }
             };
-            all.push(own(shells, of(&[BodyModel::Shell])));
+            meshes.push(make(shells, of(&[BodyModel::Shell])));
         }
-        all
+        meshes
     }
 
     /// Makes the mesh of the obstacles and tools that its bodies touch, at the start; `None` without any.
@@ -325,10 +336,10 @@ fn fill_surface(mesh: &mut Mesh, frame: &Frame<'_>, wanted: &[FieldName], surfac
 /// Points and cells without sets and data but labels.
 fn bare(mesh: &Mesh) -> Mesh {
     let bare = |block: &CellBlock| {
-        let mut own = CellBlock::new(block.kind, block.nodes.clone());
-        own.data
+        let mut kept = CellBlock::new(block.kind, block.nodes.clone());
+        kept.data
             .extend(block.data.get_key_value("label").map(|(name, labels)| (name.clone(), labels.clone())));
-        own
+        kept
     };
     let blocks = mesh.blocks.iter().map(bare).collect();
     Mesh { points: mesh.points.clone(), blocks, ..Mesh::default() }
@@ -376,18 +387,18 @@ fn merged_bodies(built: &Built, on: Option<&str>) -> (Mesh, Content) {
             // The mesh of a solid may list triangles, too.
             let is_kind =
                 |solid: &Solid| solid.body == body && solid.cells.nodes_per_cell() == kind.node_count();
-            let Some(own) = built.bodies[body].mesh.block(kind) else { continue };
+            let Some(listed) = built.bodies[body].mesh.block(kind) else { continue };
             if !built.model.solids.iter().any(is_kind) {
                 continue;
             }
-            block.nodes.extend(own.nodes.iter().map(|node| node + offsets[body]));
-            body_of.resize(body_of.len() + own.len(), body as f64);
-            match own.data.get("label") {
+            block.nodes.extend(listed.nodes.iter().map(|node| node + offsets[body]));
+            body_of.resize(body_of.len() + listed.len(), body as f64);
+            match listed.data.get("label") {
                 Some(label) => labels.extend_from_slice(&label.values),
-                None => labels.resize(labels.len() + own.len(), 0.0),
+                None => labels.resize(labels.len() + listed.len(), 0.0),
             }
             let first = places.len();
-            places.resize(first + own.len(), (0, 0));
+            places.resize(first + listed.len(), (0, 0));
             for (index, solid) in built.model.solids.iter().enumerate().filter(|(_, solid)| is_kind(solid)) {
                 for (cell, &original) in solid.original.iter().enumerate() {
                     places[first + original as usize] = (index as u32, cell as u32);
@@ -432,10 +443,14 @@ fn merged_shells(built: &Built, part: &ImplicitBodies, on: Option<&str>) -> (Mes
         let offset = mesh.points.len() as u32;
         mesh.points.extend_from_slice(&body.mesh.points);
         nodes.extend(built.model.bodies[number].all_nodes());
-        let own = body.mesh.block(CellKind::Triangle);
-        block.nodes.extend(own.map_or(&[][..], |own| &own.nodes[..]).iter().map(|node| node + offset));
+        let triangles = body.mesh.block(CellKind::Triangle);
+        block.nodes.extend(
+            triangles.map_or(&[][..], |triangles| &triangles.nodes[..]).iter().map(|node| node + offset),
+        );
         facets.extend(range.clone());
-        labels.extend_from_slice(own.and_then(|own| own.data.get("label")).map_or(&[], |of| &of.values));
+        labels.extend_from_slice(
+            triangles.and_then(|triangles| triangles.data.get("label")).map_or(&[], |of| &of.values),
+        );
         labels.resize(facets.len(), 0.0);
         owners.resize(facets.len(), number as f64);
     }
@@ -496,9 +511,9 @@ fn fill_cells(mesh: &mut Mesh, frame: &Frame<'_>, wanted: &[FieldName], at: At, 
     let Some(recovered) = frame.cells() else { return };
     let mut found: Vec<Vec<CellNumbers>> = vec![Vec::new(); model.solids.len()];
     for &(solid, _) in cells.iter().flatten() {
-        let own = &mut found[solid as usize];
-        if own.is_empty() {
-            *own = recovered.of(solid as usize, &wanted);
+        let numbers = &mut found[solid as usize];
+        if numbers.is_empty() {
+            *numbers = recovered.of(solid as usize, &wanted);
         }
     }
     let mut averages = Averages::new(mesh.points.len(), &wanted);
@@ -548,8 +563,8 @@ impl Averages {
         }
         let (sums, volumes) = &mut self.sums[slot];
         for &node in nodes {
-            let own = node as usize * value.len();
-            for (sum, v) in sums[own..].iter_mut().zip(value) {
+            let first = node as usize * value.len();
+            for (sum, v) in sums[first..].iter_mut().zip(value) {
                 *sum += v * volume;
             }
             volumes[node as usize] += volume;
@@ -621,9 +636,9 @@ nodes = { label = "left" }
         let model = &built.implicit.as_ref().unwrap().model;
         assert_eq!([0, 1].map(|facet| model.facets[facet].thickness), [1e-3, 2e-3]);
         let labels = |on: Option<&str>, curved: Option<u32>| {
-            let own = ParticipantMesh::all(&built, on, &[], At::Cells, curved).remove(0);
-            assert_eq!(own.mesh.label_names, wall.label_names);
-            own.mesh.blocks[0].data["label"].values.clone()
+            let part = ParticipantMesh::of_bodies(&built, on, &[], At::Cells, curved).remove(0);
+            assert_eq!(part.mesh.label_names, wall.label_names);
+            part.mesh.blocks[0].data["label"].values.clone()
         };
         assert_eq!(labels(None, None), [1.0, 2.0]);
         assert_eq!(labels(Some("copy"), None), [1.0, 2.0]);

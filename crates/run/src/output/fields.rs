@@ -36,13 +36,13 @@ const PLATE: f64 = 3.0;
 fn held(model: &Model) -> Vec<f64> {
     let mut held = vec![0.0; model.node_count()];
     for constraint in &model.constraints {
-        let own = match constraint.motion {
+        let mark = match constraint.motion {
             Motion::Fixed => HELD,
             Motion::Mean { .. } => PLATE,
             _ => MOVED,
         };
         for &node in &constraint.nodes {
-            held[node as usize] = own.max(held[node as usize]);
+            held[node as usize] = mark.max(held[node as usize]);
         }
     }
     held
@@ -87,13 +87,13 @@ impl<'f, 'p> OfNodes<'f, 'p> {
     }
 
     fn of_contact(&self, field: FieldName, node: usize) -> Value {
-        let found = self.touching.binary_search_by_key(&node, |own| own.node as usize);
-        let own = found.ok().map(|at| &self.touching[at]);
+        let found = self.touching.binary_search_by_key(&node, |touched| touched.node as usize);
+        let touched = found.ok().map(|at| &self.touching[at]);
         let number = match field {
-            FieldName::ContactForce => return padded(&own.map_or([0.0; 3], |own| own.force)),
-            FieldName::ContactPressure => own.and_then(|own| own.pressure),
-            FieldName::Gap => own.and_then(|own| own.gap),
-            _ => own.and_then(|own| own.slip),
+            FieldName::ContactForce => return padded(&touched.map_or([0.0; 3], |touched| touched.force)),
+            FieldName::ContactPressure => touched.and_then(|touched| touched.pressure),
+            FieldName::Gap => touched.and_then(|touched| touched.gap),
+            _ => touched.and_then(|touched| touched.slip),
         };
         padded(&[number.unwrap_or(f64::NAN)])
     }

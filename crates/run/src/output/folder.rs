@@ -55,11 +55,11 @@ impl OutputFolder {
         Ok(folder)
     }
 
-    /// Makes the folder. One with files for whose names `own` is false is rejected unless `force` is given.
+    /// Makes the folder. One with files for whose names `is_own` is false is rejected without `force`.
     ///
     /// # Errors
     /// If the folder holds something, is held by another run, or can't be written to.
-    pub fn claim(path: PathBuf, force: bool, own: impl Fn(&str) -> bool) -> Result<Self, OutputError> {
+    pub fn claim(path: PathBuf, force: bool, is_own: impl Fn(&str) -> bool) -> Result<Self, OutputError> {
         let failed = |error: io::Error| OutputError::new(&path, error);
         let refused =
             |reason: &str, remedy| OutputError { path: path.clone(), reason: reason.into(), remedy };
@@ -71,7 +71,7 @@ impl OutputFolder {
         let mut entries = fs::read_dir(&path).map_err(failed)?;
         let filled = entries.any(|entry| {
             let name = entry.map(|entry| entry.file_name().to_string_lossy().into_owned());
-            !name.is_ok_and(|name| name == LOCK || own(&name))
+            !name.is_ok_and(|name| name == LOCK || is_own(&name))
         });
         if filled && !force {
             let remedy =

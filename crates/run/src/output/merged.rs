@@ -8,14 +8,14 @@ use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh};
 /// Data that a mesh lacks are not a number there; labels and marks of things are 0.
 pub(super) fn merged(numbered: &[(&Mesh, usize)]) -> Mesh {
     let meshes: Vec<&Mesh> = numbered.iter().map(|(mesh, _)| *mesh).collect();
-    let mut all = Mesh::default();
+    let mut result = Mesh::default();
     let sizes = meshes.iter().map(|mesh| mesh.points.len());
-    all.point_data = joined(meshes.iter().map(|mesh| &mesh.point_data).zip(sizes));
+    result.point_data = joined(meshes.iter().map(|mesh| &mesh.point_data).zip(sizes));
     let mut first_points = vec![0];
     for mesh in &meshes {
-        all.points.extend_from_slice(&mesh.points);
-        all.label_names.extend(mesh.label_names.clone());
-        first_points.push(all.points.len() as u32);
+        result.points.extend_from_slice(&mesh.points);
+        result.label_names.extend(mesh.label_names.clone());
+        first_points.push(result.points.len() as u32);
     }
     let kinds: BTreeSet<CellKind> =
         meshes.iter().flat_map(|mesh| &mesh.blocks).map(|block| block.kind).collect();
@@ -29,17 +29,17 @@ pub(super) fn merged(numbered: &[(&Mesh, usize)]) -> Mesh {
         let mut whole = CellBlock::new(kind, nodes.collect());
         whole.data = joined(blocks.iter().map(|(_, block)| (&block.data, block.len())));
         let body = blocks.iter().flat_map(|&(index, block)| {
-            let (first, own) = (numbered[index].1 as f64, block.data.get("body"));
-            (0..block.len()).map(move |cell| first + own.map_or(0.0, |own| own.values[cell]))
+            let (first, given) = (numbered[index].1 as f64, block.data.get("body"));
+            (0..block.len()).map(move |cell| first + given.map_or(0.0, |given| given.values[cell]))
         });
         whole.data.insert("body".into(), DataArray::scalar(body.collect()));
         for name in ["label", "thing"] {
             let Some(numbers) = whole.data.get_mut(name) else { continue };
             numbers.values.iter_mut().filter(|number| number.is_nan()).for_each(|number| *number = 0.0);
         }
-        all.blocks.push(whole);
+        result.blocks.push(whole);
     }
-    all
+    result
 }
 
 /// Joins data one after another; each part has the given number of items.

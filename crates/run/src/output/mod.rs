@@ -126,16 +126,16 @@ impl<'a> Recovered<'a> {
             let steps = missing.contains(&FieldName::ElementStep);
             let numbers = self.now.numbers(solid, steps, width, &|found, mut to| {
                 for &field in &missing {
-                    let (own, rest) = to.split_at_mut(field.components());
-                    own.copy_from_slice(&fields::of_cell(found, field)[..own.len()]);
+                    let (target, rest) = to.split_at_mut(field.components());
+                    target.copy_from_slice(&fields::of_cell(found, field)[..target.len()]);
                     to = rest;
                 }
             });
             let (numbers, mut first) = (Rc::new(numbers), 0);
             for field in missing {
-                let own = first..first + field.components();
-                first = own.end;
-                known.push((field, CellNumbers { numbers: Rc::clone(&numbers), width, own }));
+                let columns = first..first + field.components();
+                first = columns.end;
+                known.push((field, CellNumbers { numbers: Rc::clone(&numbers), width, columns }));
             }
         }
         let find = |field: &FieldName| known.iter().find(|(known, _)| known == field);
@@ -150,13 +150,13 @@ struct CellNumbers {
     numbers: Rc<Vec<f64>>,
     /// Numbers of a cell, and where this field is among them.
     width: usize,
-    own: Range<usize>,
+    columns: Range<usize>,
 }
 
 impl CellNumbers {
     /// The components in a cell.
     fn at(&self, cell: usize) -> &[f64] {
-        &self.numbers[cell * self.width..][self.own.clone()]
+        &self.numbers[cell * self.width..][self.columns.clone()]
     }
 }
 

@@ -138,16 +138,15 @@ fn held_back(part: &PlannedParticipant, now: &dyn Instant) -> Vec<HeldBack> {
         let (lag, time) = lag.longest();
         (lag > 0.0).then(|| HeldBack { name: name.to_owned(), is_volume, lag, time })
     };
-    let rigids = part.built.contacts.iter().flat_map(|all| &all.rigids).enumerate();
+    let rigids = part.built.contacts.iter().flat_map(|contacts| &contacts.rigids).enumerate();
     let mut held: Vec<HeldBack> =
         rigids.filter_map(|(number, rigid)| of(rigid.tool(), false, now.lag(number)?)).collect();
     // Jaws lag together.
     held.dedup();
     let constraints = part.built.model.constraints.iter().enumerate();
-    held.extend(
-        constraints
-            .filter_map(|(number, own)| of(&own.name, own.motion.encloses(), now.lag_of_constraint(number)?)),
-    );
+    held.extend(constraints.filter_map(|(number, constraint)| {
+        of(&constraint.name, constraint.motion.encloses(), now.lag_of_constraint(number)?)
+    }));
     held
 }
 
@@ -217,7 +216,7 @@ impl History {
         self.reactions.push(frames.iter().flat_map(Frame::reactions).map(size).collect());
         for frame in frames {
             let constraints = frame.part.built.model.constraints.iter().enumerate();
-            for (index, _) in constraints.filter(|(_, own)| own.motion.encloses()) {
+            for (index, _) in constraints.filter(|(_, constraint)| constraint.motion.encloses()) {
                 let Enclosed { volume, pressure } = frame.now.enclosed(index).unwrap_or_default();
                 self.enclosed.push([volume, pressure]);
             }
@@ -275,8 +274,8 @@ impl Intersections {
             if found.depth > self.deepest {
                 (self.deepest, self.time, self.at) = (found.depth, now.time(), found.place);
                 let contacts = part.built.contacts.as_deref();
-                self.contact =
-                    contacts.map_or_else(String::new, |all| all.contacts[found.contact].name.clone());
+                self.contact = contacts
+                    .map_or_else(String::new, |contacts| contacts.contacts[found.contact].name.clone());
             }
         });
         self.states += u64::from(self.count > before);

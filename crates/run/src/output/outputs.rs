@@ -65,8 +65,8 @@ impl<'scope> Outputs<'scope> {
                         series.take_up(times);
                     }
                     files.push(series.index().to_owned());
-                    let own: Own = (place, Box::new(series));
-                    if spare.is_some() { &mut far } else { &mut near }.push(own);
+                    let placed: Own = (place, Box::new(series));
+                    if spare.is_some() { &mut far } else { &mut near }.push(placed);
                     table.every
                 }
                 OutputTable::Csv(table) => {
@@ -154,18 +154,18 @@ impl<'scope> Outputs<'scope> {
 
     /// Returns what the outputs have written so far, for a checkpoint.
     pub fn written(&mut self) -> Result<Vec<(Schedule, Written)>, Failure> {
-        let mut all: Vec<(usize, Written)> =
+        let mut collected: Vec<(usize, Written)> =
             self.near.iter().map(|(place, output)| (*place, output.written())).collect();
         if let Some(far) = &self.far {
             let (sender, receiver) = channel();
             let asked = far.tasks.send(Task::Written(sender));
             match asked.ok().and_then(|()| receiver.recv().ok()) {
-                Some(written) => all.extend(written),
+                Some(written) => collected.extend(written),
                 None => self.end()?,
             }
         }
-        all.sort_by_key(|(place, _)| *place);
-        Ok(self.schedules.iter().copied().zip(all.into_iter().map(|(_, written)| written)).collect())
+        collected.sort_by_key(|(place, _)| *place);
+        Ok(self.schedules.iter().copied().zip(collected.into_iter().map(|(_, written)| written)).collect())
     }
 
     /// Waits for all that is under way on the other thread.

@@ -51,8 +51,10 @@ pub(crate) fn constraints(world: &World) -> impl Iterator<Item = &Constraint> {
 pub(crate) fn plot(world: &World, history: &History) -> Result<String, String> {
     let mut svg = String::new();
     {
-        let filled: Vec<&str> =
-            constraints(world).filter(|own| own.motion.encloses()).map(|own| own.name.as_str()).collect();
+        let filled: Vec<&str> = constraints(world)
+            .filter(|constraint| constraint.motion.encloses())
+            .map(|constraint| constraint.name.as_str())
+            .collect();
         let panels = if filled.is_empty() { 2 } else { 4 };
         let root = SVGBackend::with_string(&mut svg, (WIDTH, HEIGHT * panels)).into_drawing_area();
         root.fill(&WHITE).map_err(|error| error.to_string())?;
@@ -81,7 +83,7 @@ pub(crate) fn plot(world: &World, history: &History) -> Result<String, String> {
         {
             let values = |at: usize| history.enclosed.iter().skip(at).step_by(filled.len());
             let curves: Vec<Curve<'_>> = (filled.iter().enumerate())
-                .map(|(at, name)| Curve::new(name, &history.times, values(at).map(|own| own[kind])))
+                .map(|(at, name)| Curve::new(name, &history.times, values(at).map(|enclosed| enclosed[kind])))
                 .collect();
             panel(area, title, unit, &curves)?;
         }

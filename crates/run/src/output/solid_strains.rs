@@ -64,21 +64,21 @@ impl SolidStrains {
         for (index, solid) in model.solids.iter().enumerate() {
             if keeps_volume(solid) {
                 let change = |fields: &CellFields, to: &mut [f64]| to[0] = fields.volume_ratio - 1.0;
-                let all = cells.numbers(index, false, 1, &change);
+                let changes = cells.numbers(index, false, 1, &change);
                 let known = self.volumes[index].as_ref().map_or(0.0, |known| known.change.abs());
-                if let Some((cell, change)) = largest(all.iter().map(|change| change.abs()), known) {
-                    let (change, element) = (all[cell].signum() * change, solid.original[cell]);
+                if let Some((cell, change)) = largest(changes.iter().map(|change| change.abs()), known) {
+                    let (change, element) = (changes[cell].signum() * change, solid.original[cell]);
                     let found = VolumeChange { body: body(solid), change, element, time: now.time() };
                     self.volumes[index] = Some(found);
                 }
             }
             let Some(limits) = wrinkling_forces(model, solid) else { continue };
             let compression = |fields: &CellFields, to: &mut [f64]| to[0] = compressive_force(fields);
-            let all = cells.numbers(index, false, 1, &compression);
+            let forces = cells.numbers(index, false, 1, &compression);
             let known = self.membranes[index].as_ref().map_or(0.0, |known| known.part);
-            let parts = all.iter().zip(&limits).map(|(force, limit)| force / limit);
+            let parts = forces.iter().zip(&limits).map(|(force, limit)| force / limit);
             if let Some((cell, part)) = largest(parts, known) {
-                let (force, element) = (all[cell], solid.original[cell]);
+                let (force, element) = (forces[cell], solid.original[cell]);
                 self.membranes[index] =
                     Some(Compression { body: body(solid), part, force, element, time: now.time() });
             }
@@ -92,8 +92,8 @@ impl SolidStrains {
 
     /// Warnings about the result.
     pub fn doubts(&self) -> impl Iterator<Item = String> {
-        let volumes = self.volumes().filter(|own| own.change.abs() > MUCH).map(|own| {
-            let VolumeChange { body, change, element, time } = own;
+        let volumes = self.volumes().filter(|found| found.change.abs() > MUCH).map(|found| {
+            let VolumeChange { body, change, element, time } = found;
             format!(
                 "`{body}` changes its volume by {:+.1} % in element {element} (counted from 0) at t = {} s; its law is \
                  nearly incompressible or has fibres, which load the bulk modulus; take a larger `bulk-modulus` or `poisson-ratio`",
@@ -101,8 +101,8 @@ impl SolidStrains {
                 number(*time)
             )
         });
-        let membranes = self.membranes.iter().flatten().filter(|own| own.part > NEAR_WRINKLES).map(|own| {
-            let Compression { body, part, force, element, time } = own;
+        let membranes = self.membranes.iter().flatten().filter(|found| found.part > NEAR_WRINKLES).map(|found| {
+            let Compression { body, part, force, element, time } = found;
             format!(
                 "the membrane `{body}` is compressed by {} N/m in element {element} (counted from 0) at t = {} s; this is {:.1} times the force \
                  at which wrinkles as short as its edges appear, so its shape depends on the mesh; give it bending \
@@ -117,8 +117,8 @@ impl SolidStrains {
 }
 
 /// The largest of some numbers that are not negative, where it is above a known one.
-fn largest(all: impl Iterator<Item = f64>, known: f64) -> Option<(usize, f64)> {
-    all.enumerate().fold(
+fn largest(values: impl Iterator<Item = f64>, known: f64) -> Option<(usize, f64)> {
+    values.enumerate().fold(
         None,
         |best: Option<(usize, f64)>, (at, x)| {
             if x > best.map_or(known, |(_, most)| most) { Some((at, x)) } else { best }
@@ -159,8 +159,8 @@ fn wrinkling_forces(model: &Model, membrane: &Solid) -> Option<Vec<f64>> {
         let moduli = solid.material.law.small_strain();
         let plane_strain = moduli.young() / (1.0 - moduli.poisson().powi(2));
         for &node in (0..solid.cells.len()).flat_map(|cell| solid.cells.nodes(cell)) {
-            let own = &mut modulus[node as usize];
-            *own = own.min(plane_strain);
+            let least = &mut modulus[node as usize];
+            *least = least.min(plane_strain);
         }
     }
     let force = |cell: usize| {
@@ -173,6 +173,6 @@ fn wrinkling_forces(model: &Model, membrane: &Solid) -> Option<Vec<f64>> {
         let softest = nodes.iter().map(|&node| modulus[node as usize]).fold(f64::INFINITY, f64::min);
         softest * edge / TAU
     };
-    let all: Vec<f64> = (0..membrane.cells.len()).map(force).collect();
-    all.iter().any(|force| force.is_finite()).then_some(all)
+    let forces: Vec<f64> = (0..membrane.cells.len()).map(force).collect();
+    forces.iter().any(|force| force.is_finite()).then_some(forces)
 }

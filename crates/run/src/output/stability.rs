@@ -163,7 +163,7 @@ pub(crate) fn doubts(
 pub(crate) fn hourglass_failure(world: &World, outcome: &Outcome) -> Option<Failure> {
     let allowed = world.scene.run.allow_hourglass;
     let (part, share) = (world.participants.iter().zip(&outcome.parts))
-        .map(|(part, own)| (part, own.hourglass_share))
+        .map(|(part, result)| (part, result.hourglass_share))
         .max_by(|a, b| a.1.total_cmp(&b.1))
         .filter(|(_, share)| *share > allowed)?;
     let most = format!("{} % that `allow-hourglass` of `[run]` allows at the end", number(allowed * 100.0));

@@ -230,16 +230,17 @@ pub(crate) fn summarise(world: &World, outcome: &Outcome) -> Summary {
     let parts = || world.participants.iter().zip(&outcome.parts);
     let bodies: Vec<BodySummary> = parts().flat_map(|(part, _)| bodies(&part.built)).collect();
     let limits = parts().find_map(|(part, _)| part.plan.limits.as_ref());
-    let stability = || parts().map(|(part, own)| StabilitySummary::new(part, own));
-    let doubts = |((part, own), seen): ((&PlannedParticipant, &PartOutcome), Option<StabilitySummary>)| {
-        doubts(&part.built, own, seen.as_ref())
+    let stability = || parts().map(|(part, result)| StabilitySummary::new(part, result));
+    let doubts = |((part, result), seen): ((&PlannedParticipant, &PartOutcome), Option<StabilitySummary>)| {
+        doubts(&part.built, result, seen.as_ref())
     };
     let reactions = parts()
-        .flat_map(|(part, own)| part.built.model.constraints.iter().zip(&own.reactions))
+        .flat_map(|(part, result)| part.built.model.constraints.iter().zip(&result.reactions))
         .filter(|(constraint, _)| !constraint.motion.encloses());
-    let volumes = parts().flat_map(|(part, own)| part.built.model.constraints.iter().zip(&own.enclosed));
+    let volumes =
+        parts().flat_map(|(part, result)| part.built.model.constraints.iter().zip(&result.enclosed));
     let target = &world.participants[0].plan.target;
-    let balances = parts().filter_map(|(_, own)| own.balance());
+    let balances = parts().filter_map(|(_, result)| result.balance());
     Summary {
         status: match &outcome.failure {
             None => "done",
@@ -257,19 +258,19 @@ pub(crate) fn summarise(world: &World, outcome: &Outcome) -> Summary {
         limiting_element: limits.map(|limits| limits.limiting.clone()),
         participants: match world.only() {
             Some(_) => Vec::new(),
-            None => parts().map(|(part, own)| ParticipantSummary::new(part, own)).collect(),
+            None => parts().map(|(part, result)| ParticipantSummary::new(part, result)).collect(),
         },
         ties: outcome.ties.clone(),
         guests: outcome.guests.clone(),
-        solver: parts().find_map(|(_, own)| own.effort.clone()),
-        equilibria: parts().find_map(|(_, own)| own.equilibria),
+        solver: parts().find_map(|(_, result)| result.effort.clone()),
+        equilibria: parts().find_map(|(_, result)| result.equilibria),
         ended: outcome.ended.clone(),
-        shell_strains: parts().flat_map(|(_, own)| own.watched.strains.0.clone()).collect(),
+        shell_strains: parts().flat_map(|(_, result)| result.watched.strains.0.clone()).collect(),
         intersections: parts()
             .filter(|(part, _)| part.built.check_intersections)
-            .map(|(_, own)| own.watched.intersections.clone())
+            .map(|(_, result)| result.watched.intersections.clone())
             .reduce(Intersections::with),
-        volume_changes: parts().flat_map(|(_, own)| own.watched.solids.volumes().cloned()).collect(),
+        volume_changes: parts().flat_map(|(_, result)| result.watched.solids.volumes().cloned()).collect(),
         device: target.name().to_owned(),
         precision: target.precision.word(),
         steps: outcome.steps,
@@ -281,7 +282,7 @@ pub(crate) fn summarise(world: &World, outcome: &Outcome) -> Summary {
         energy_balance: balances.reduce(f64::max),
         reactions: reactions.map(|(constraint, force)| (constraint.name.clone(), *force)).collect(),
         volumes: volumes
-            .filter_map(|(constraint, own)| Some((constraint.name.clone(), (*own)?)))
+            .filter_map(|(constraint, enclosed)| Some((constraint.name.clone(), (*enclosed)?)))
             .map(|(name, Enclosed { volume, pressure })| (name, [volume, pressure]))
             .collect(),
         files: outcome.files.iter().map(|file| file.display().to_string()).collect(),
@@ -343,8 +344,8 @@ fn write_page(page: &mut String, world: &World, outcome: &Outcome, summary: &Sum
             number(*mass)
         )?;
     }
-    for (part, own) in world.participants.iter().zip(&outcome.parts) {
-        write_part(page, part, own)?;
+    for (part, result) in world.participants.iter().zip(&outcome.parts) {
+        write_part(page, part, result)?;
     }
     if world.only().is_none() {
         writeln!(page, "\n## Energy of all participants at the end\n\n| | J |\n|---|---|")?;
@@ -450,15 +451,15 @@ fn write_effort(page: &mut String, effort: &Effort, steps: u64) -> std::fmt::Res
 }
 
 fn write_volume_changes(page: &mut String, outcome: &PartOutcome) -> std::fmt::Result {
-    let mut all = outcome.watched.solids.volumes().peekable();
-    if all.peek().is_none() {
+    let mut changes = outcome.watched.solids.volumes().peekable();
+    if changes.peek().is_none() {
         return Ok(());
     }
     writeln!(
         page,
         "\n## Largest changes of volume\n\n| body | J − 1 | element | at t [s] |\n|---|---|---|---|"
     )?;
-    for VolumeChange { body, change, element, time } in all {
+    for VolumeChange { body, change, element, time } in changes {
         writeln!(page, "| {body} | {:+.2} % | {element} | {} |", 100.0 * change, number(*time))?;
     }
     Ok(())
@@ -543,9 +544,9 @@ fn write_reactions(page: &mut String, world: &World, outcome: &Outcome) -> std::
         page,
         "\n## Reactions\n\n| constraint | nodes | at the end [N] | largest [N] |\n|---|---|---|---|"
     )?;
-    let forces = outcome.parts.iter().flat_map(|own| &own.reactions);
-    let all = constraints(world).zip(forces).enumerate();
-    for (index, (constraint, force)) in all.filter(|(_, (constraint, _))| binds(constraint)) {
+    let forces = outcome.parts.iter().flat_map(|part| &part.reactions);
+    let pairs = constraints(world).zip(forces).enumerate();
+    for (index, (constraint, force)) in pairs.filter(|(_, (constraint, _))| binds(constraint)) {
         let [x, y, z] = force.map(number);
         let nodes = constraint.nodes.len();
         let largest = number(outcome.history.largest_reaction(index));

@@ -36,12 +36,12 @@ impl Series {
         folder: &Path,
         name: &str,
     ) -> Result<Self, OutputError> {
-        let own = folder.join(name);
-        check_own_folder(&own)
-            .and_then(|()| fs::create_dir_all(&own))
-            .map_err(|error| OutputError::new(&own, error))?;
+        let path = folder.join(name);
+        check_own_folder(&path)
+            .and_then(|()| fs::create_dir_all(&path))
+            .map_err(|error| OutputError::new(&path, error))?;
         Ok(Self {
-            folder: own,
+            folder: path,
             index: folder.join(format!("{name}.pvd")),
             open: None,
             name: name.into(),
@@ -103,9 +103,9 @@ impl Series {
     /// Writes the list of all frames in place of the old one; returns it and where its entries end, if it can
     /// be written on.
     fn list_all(&self) -> io::Result<Option<(File, u64)>> {
-        let all = self.times.iter().chain(&self.beyond).enumerate();
-        let list =
-            pvd_text(all.map(|(index, &time)| (time, self.listed_name(index)))).map_err(io::Error::other)?;
+        let frames = self.times.iter().chain(&self.beyond).enumerate();
+        let list = pvd_text(frames.map(|(index, &time)| (time, self.listed_name(index))))
+            .map_err(io::Error::other)?;
         replace(&self.index, |file| file.write_all(list.as_bytes()))?;
         // The index is written as a whole as long as it lists frames of an interrupted run.
         let file = self.beyond.is_empty().then(|| reopen(&self.index).ok()).flatten();

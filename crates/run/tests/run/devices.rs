@@ -129,7 +129,7 @@ fn organs_and_a_grasper_touch_on_a_device_as_on_the_processor() {
     }
     let [(names, cpu), (_, gpu)] =
         ["cpu", "gpu"].map(|device| workshop.table(&format!("out/{device}/history.csv")));
-    let column = |name: &str| names.iter().position(|own| own == name).expect("a column");
+    let column = |name: &str| names.iter().position(|known| known == name).expect("a column");
     let bears = column("contact.lie.liver-stomach.z");
     assert!([&cpu, &gpu].iter().all(|rows| rows.iter().any(|row| row[bears] < -1.0)));
     for (name, within) in [("contact.lie.liver-table.z", 1e-3), ("energy.internal", 1e-3)] {
@@ -214,9 +214,9 @@ fn solutions_that_a_device_leaves_to_the_processor_are_counted() {
     let linear = "run.linear={ by = \"conjugate-gradients\", tolerance = 1e-17 }";
     let gpu = tube("device = \"gpu\"");
     let json = gpu.run(&[linear]).done();
-    let [left, all] = ["left_to_cpu", "solutions"].map(|key| json["solver"][key].as_u64().unwrap());
-    assert!(left > 0 && left <= all, "{json}");
-    let row = format!("| solutions that the GPU left to the CPU | {left} of {all} |");
+    let [left, solved] = ["left_to_cpu", "solutions"].map(|key| json["solver"][key].as_u64().unwrap());
+    assert!(left > 0 && left <= solved, "{json}");
+    let row = format!("| solutions that the GPU left to the CPU | {left} of {solved} |");
     assert!(gpu.read("out/case/summary.md").contains(&row), "{row}");
 }
 

@@ -156,7 +156,7 @@ probes.middle = {{ on = "block", at = [0.05, 0.05, 0.05], data = ["displacement"
             output.err
         );
         let (header, rows) = workshop.table("out/case/history.csv");
-        let column = |name: &str| header.iter().position(|own| own == name).unwrap();
+        let column = |name: &str| header.iter().position(|known| known == name).unwrap();
         let slack = if precision == "double" { 1e-12 } else { 1e-5 };
         assert!(rows.len() >= 6);
         for row in &rows {
@@ -181,8 +181,9 @@ fn damping_slows_what_started_with_a_velocity() {
     let workshop = Workshop::new(&format!("{free}{output}"));
     workshop.run(&[]).done();
     let (header, rows) = workshop.table("out/case/history.csv");
-    let column =
-        |axis: &str| header.iter().position(|own| *own == format!("probe.middle.velocity.{axis}")).unwrap();
+    let column = |axis: &str| {
+        header.iter().position(|known| *known == format!("probe.middle.velocity.{axis}")).unwrap()
+    };
     for row in &rows {
         let decay = (-5.0 * row[0]).exp();
         // (α Δt)²/12 of a step of a millisecond.

@@ -57,8 +57,8 @@ const FIELDS: [(&str, usize); 10] = [
 
 #[test]
 fn vtu_arrays_are_named_as_promised_and_tensors_have_nine_components() {
-    let all = FIELDS.map(|(name, _)| format!("\"{name}\"")).join(", ");
-    let data = format!("data = [{all}]");
+    let names = FIELDS.map(|(name, _)| format!("\"{name}\"")).join(", ");
+    let data = format!("data = [{names}]");
     let workshop = Workshop::block("data = [\"displacement\", \"von-mises\"]", &data);
     workshop.run(&[]).done();
     let frames = workshop.series("out/case/fields.pvd");

@@ -105,7 +105,7 @@ fn a_run_on_a_gpu_goes_back_too() {
     }
     let on = |device: &str| Workshop::new(&pressed(SOON).replace("precision = \"double\"", device));
     let [gpu, cpu] = [on("device = \"gpu\""), on("precision = \"single\"")]
-        .map(|own| (own.run(&[]).done(), own.table("out/case/history.csv")));
+        .map(|workshop| (workshop.run(&[]).done(), workshop.table("out/case/history.csv")));
     for (output, (_, rows)) in [&gpu, &cpu] {
         assert_eq!((output["stability"]["halvings"].as_u64(), rows.len()), (Some(1), 401), "{output}");
     }

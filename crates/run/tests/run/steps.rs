@@ -46,9 +46,9 @@ fn every_law_runs_by_its_name() {
             "modulus = 3e3\nnormal = [[1, 0.2, 0.2], [0.2, 1, 0.2], [0.2, 0.2, 1]]\nshear = [1, 1, 1]",
         ),
     ];
-    for (name, matrix, own) in laws {
+    for (name, matrix, moduli) in laws {
         let mut scene = changed(BLOCK, "\"transversely-isotropic\"", &format!("\"{name}\""));
-        scene = scene.replace(elastic, matrix).replace("fibre-modulus = 5e3", own);
+        scene = scene.replace(elastic, matrix).replace("fibre-modulus = 5e3", moduli);
         let workshop = Workshop::new(&scene);
         let output = workshop.run(&[]);
         assert_eq!(output.status(), "done", "{name}: {}", output.err);

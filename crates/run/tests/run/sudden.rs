@@ -140,7 +140,7 @@ fn no_step_is_too_long(seeds: Range<u64>) -> (usize, usize) {
     let threads = thread::available_parallelism().map_or(1, NonZero::get);
     thread::scope(|scope| (0..threads).for_each(|_| _ = scope.spawn(work)));
     let runs = runs.into_inner().expect("no panic");
-    let count = |end| runs.iter().filter(|(own, _)| *own == end).count();
+    let count = |end| runs.iter().filter(|(ended, _)| *ended == end).count();
     let [unstable, collapsed] = [End::Unstable, End::Collapsed].map(count);
     let saved = runs.iter().filter(|(_, halvings)| *halvings != 0).count();
     println!(

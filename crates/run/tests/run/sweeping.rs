@@ -27,9 +27,9 @@ fn a_sweep_runs_the_product_and_tells_what_each_run_came_to() {
         assert_eq!((row[0].as_str(), row[column("status")].as_str()), (&*run.to_string(), "done"));
         assert!((row[column("time")].parse::<f64>().unwrap() - 0.008).abs() < 1e-12);
         // Every number equals the number of the single run.
-        let own = workshop.table(&format!("out/sweep/run-{run:04}/history.csv"));
-        let last = own.1.last().unwrap();
-        for (name, value) in own.0.iter().zip(last).skip(1) {
+        let single = workshop.table(&format!("out/sweep/run-{run:04}/history.csv"));
+        let last = single.1.last().unwrap();
+        for (name, value) in single.0.iter().zip(last).skip(1) {
             let name = if name.starts_with("probe.") { &format!("history.{name}") } else { name };
             assert_eq!(row[column(name)].parse::<f64>().unwrap(), *value, "{name}");
         }

@@ -39,8 +39,8 @@ fn a_folded_balloon_widens_a_stenosis_and_leaves_it() {
         let mut simulation = world.simulation().unwrap();
         let run = simulation.run(2.0, |frame| {
             let moved = |body: &str, rest: &[Vector3<f64>], nodes: &[usize]| -> Vec<Vector3<f64>> {
-                let all = frame.displacements(body).unwrap();
-                nodes.iter().map(|&n| rest[n] + Vector3::from(all[n])).collect()
+                let displacements = frame.displacements(body).unwrap();
+                nodes.iter().map(|&n| rest[n] + Vector3::from(displacements[n])).collect()
             };
             let ring = moved("deposit", &vessel, &throat);
             let half = |pair: &[Vector3<f64>]| pair[0].x * pair[1].y - pair[0].y * pair[1].x;
@@ -57,7 +57,7 @@ fn a_folded_balloon_widens_a_stenosis_and_leaves_it() {
             areas.push((frame.time(), area));
         });
         run.unwrap_or_else(|failure| panic!("{}", failure.message));
-        let most = areas.iter().map(|own| own.1).fold(0.0, f64::max);
+        let most = areas.iter().map(|sample| sample.1).fold(0.0, f64::max);
         let last = areas[areas.len() - 1].1 / areas[0].1;
         println!(
             "{young} Pa: lumen {:.3} to {:.3} mm², {last:.6} of it after; forces off balance by {:.2} %",
@@ -65,7 +65,7 @@ fn a_folded_balloon_widens_a_stenosis_and_leaves_it() {
             1e6 * most,
             100.0 * worst
         );
-        let filled: Vec<f64> = areas.iter().filter(|own| own.0 < 1.0).map(|own| own.1).collect();
+        let filled: Vec<f64> = areas.iter().filter(|sample| sample.0 < 1.0).map(|sample| sample.1).collect();
         assert!(filled.windows(2).all(|pair| pair[1] > pair[0] * (1.0 - 1e-9)));
         assert!((last - 1.0).abs() < 1e-3 && worst < 0.03, "{last} {worst}");
         widest.push(most);

@@ -29,8 +29,8 @@ const UPRIGHT: &str =
 /// of nodes sum to the force of the contact.
 #[test]
 fn the_pressure_of_a_node_is_the_load_over_the_area_and_the_law_at_its_gap() {
-    let all = "[output.all]\ntype = 'vtu'\nevery = 1\ndata = ['contact-force', 'contact-pressure', 'gap', 'slip']\n";
-    let text = standing(IMPLICIT, "", &format!("{UPRIGHT}{all}"));
+    let output = "[output.all]\ntype = 'vtu'\nevery = 1\ndata = ['contact-force', 'contact-pressure', 'gap', 'slip']\n";
+    let text = standing(IMPLICIT, "", &format!("{UPRIGHT}{output}"));
     let out = tempfile::tempdir().unwrap();
     run(&text, &out.path().join("out"));
     let mesh = io::read(&out.path().join("out/all/000001.vtu")).unwrap().mesh;

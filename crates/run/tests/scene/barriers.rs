@@ -116,8 +116,8 @@ fn ridges_that_go_through_each_other_are_parted() {
     let highest = ways.iter().map(|u| u[2]).fold(0.0, f64::max);
     assert!((2e-4..2e-3).contains(&highest), "{highest} m");
     // One table for all pairs asks for each pair.
-    let all = crossed("separate = true").replace("['lower', 'upper']", "['all', 'all']");
-    assert!(world(&all).unwrap().only().unwrap().built.pushed.is_some());
+    let every_pair = crossed("separate = true").replace("['lower', 'upper']", "['all', 'all']");
+    assert!(world(&every_pair).unwrap().only().unwrap().built.pushed.is_some());
     assert!(last_row(&crossed("separate = true"))["energy.internal"] > 0.0);
 }
 

@@ -204,8 +204,8 @@ fn a_rigid_end_of_a_shell_turns_with_its_nodes() {
     let turn = of(&first, "left", "rotation");
     assert!(turn[0].abs() > 0.01 && turn[1].abs() > 0.1, "{turn:?}");
     for probe in ["right", "inner"] {
-        let own = of(&first, probe, "rotation");
-        assert!((0..3).all(|c| (own[c] - turn[c]).abs() < 1e-13), "{probe}: {own:?} {turn:?}");
+        let rotation = of(&first, probe, "rotation");
+        assert!((0..3).all(|c| (rotation[c] - turn[c]).abs() < 1e-13), "{probe}: {rotation:?} {turn:?}");
     }
     let place = |probe: &str, rest: [f64; 3]| {
         let moved = of(&first, probe, "displacement");

@@ -153,11 +153,11 @@ fn all_touch_all() {
     let text = stacked("", "");
     let (start, rest) = text.split_once("[contact.below]").unwrap();
     let (_, end) = rest.split_once("[output.history]").unwrap();
-    let all = last_row(&format!("{start}{table}{end}"));
+    let row = last_row(&format!("{start}{table}{end}"));
     let columns: Vec<&String> =
-        all.keys().filter(|name| name.starts_with("contact.") && name.ends_with(".z")).collect();
+        row.keys().filter(|name| name.starts_with("contact.") && name.ends_with(".z")).collect();
     println!("{columns:?}");
-    let (between, floor) = (all["contact.every.block-lid.z"], all["contact.every.block-floor.z"]);
+    let (between, floor) = (row["contact.every.block-lid.z"], row["contact.every.block-floor.z"]);
     assert!((between / named["contact.above.z"] + 1.0).abs() < 0.02, "{between}");
     assert!((floor / named["contact.below.z"] - 1.0).abs() < 0.02, "{floor}");
     let turned = text.replace("['lid', 'block']", "['block', 'lid']");

@@ -18,7 +18,8 @@ fn bodies_keep_a_distance_if_none_is_given() {
     let offsets = |text: &str| {
         let built = &world(text).unwrap();
         let contacts = built.only().unwrap().built.contacts.clone().unwrap();
-        let one = |name: &str| contacts.contacts.iter().find(|own| own.name == name).unwrap().touch.offset;
+        let one =
+            |name: &str| contacts.contacts.iter().find(|contact| contact.name == name).unwrap().touch.offset;
         ["below", "above", "itself"].map(one)
     };
     let [floor, between, itself] = offsets(&usual);
@@ -27,7 +28,7 @@ fn bodies_keep_a_distance_if_none_is_given() {
     let known = world(&usual).unwrap();
     for name in ["above", "itself"] {
         let note = format!("contact `{name}`: surfaces keep ");
-        let note = known.notes().find(|own| own.starts_with(&note)).unwrap();
+        let note = known.notes().find(|text| text.starts_with(&note)).unwrap();
         assert!(note.contains("0.5 % of their mean edge, because `thickness` is not given"), "{note}");
     }
     assert!(!known.notes().any(|note| note.contains("contact `below`")));
@@ -116,7 +117,7 @@ fn intersections_are_counted() {
     assert_eq!(counted.searched, 81);
     assert!(counted.count > 0 && counted.states > 0 && counted.deepest > 0.0, "{counted:?}");
     assert_eq!(counted.contact, "crack");
-    let warning = summary.warnings.iter().find(|own| own.contains("of edges with triangles in")).unwrap();
+    let warning = summary.warnings.iter().find(|text| text.contains("of edges with triangles in")).unwrap();
     assert!(warning.starts_with("contact `crack`: ") && warning.contains("larger `thickness`"), "{warning}");
     assert!(found("").intersections.is_none());
     // Without an output the last state is searched.

@@ -208,7 +208,7 @@ fn what_is_stored_at_the_start_is_in_the_book() {
     let table = fs::read_to_string(out.path().join("out/history.csv")).unwrap();
     let mut rows = table.lines().map(|line| line.split(',').collect::<Vec<_>>());
     let names = rows.next().unwrap();
-    let column = |name: &str| names.iter().position(|own| *own == name).unwrap();
+    let column = |name: &str| names.iter().position(|known| *known == name).unwrap();
     let [internal, external, hourglass] =
         ["internal", "external", "hourglass"].map(|name| column(&format!("energy.{name}")));
     let rows: Vec<Vec<f64>> =

@@ -62,9 +62,9 @@ fn contact_goes_with_every_element_law_and_way_to_step() {
     };
     let hexes = goes_through("hex8", &plain);
     for element in ["tet4", "tet4-anp", "tet4-ianp", "tet4-ianp-niftysim", "hex8-full"] {
-        let own = format!("law = 'tissue'\nelement = '{element}'");
+        let lines = format!("law = 'tissue'\nelement = '{element}'");
         let mesh = if element.starts_with("tet") { "as = 'tets'" } else { "as = 'hexes'" };
-        let found = goes_through(element, &replaced(&[["law = 'tissue'", &own], ["as = 'hexes'", mesh]]));
+        let found = goes_through(element, &replaced(&[["law = 'tissue'", &lines], ["as = 'hexes'", mesh]]));
         // Coarse cells of another kind.
         assert!((0.7..1.8).contains(&(found / hexes)), "{element}: {found} {hexes}");
     }

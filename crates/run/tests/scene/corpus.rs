@@ -29,7 +29,7 @@ fn folder() -> PathBuf {
 fn corpus(ending: &str) -> Vec<(String, Vec<u8>)> {
     let paths = fs::read_dir(folder()).unwrap().map(|entry| entry.unwrap().path());
     let mut found: Vec<_> = paths
-        .filter(|path| path.extension().is_some_and(|own| own == ending))
+        .filter(|path| path.extension().is_some_and(|extension| extension == ending))
         .map(|path| (path.file_name().unwrap().to_string_lossy().into_owned(), fs::read(&path).unwrap()))
         .collect();
     found.sort();
@@ -48,8 +48,8 @@ fn mistakes(bytes: &[u8]) -> Option<String> {
 
 /// The project's scenes.
 fn scenes() -> Vec<(String, Vec<u8>)> {
-    let all = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
-    let paths = fs::read_dir(all).unwrap().map(|entry| entry.unwrap().path().join("scene.toml"));
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
+    let paths = fs::read_dir(root).unwrap().map(|entry| entry.unwrap().path().join("scene.toml"));
     let mut found: Vec<_> = paths.filter(|path| path.is_file()).collect();
     found.sort();
     found.into_iter().map(|path| (path.display().to_string(), fs::read(path).unwrap())).collect()

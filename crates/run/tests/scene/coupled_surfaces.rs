@@ -33,8 +33,8 @@ pub(super) fn column(out: &std::path::Path, name: &str, from: f64) -> Vec<f64> {
     let text = std::fs::read_to_string(out.join("history.csv")).unwrap();
     let mut rows = text.lines();
     let head: Vec<&str> = rows.next().unwrap().split(',').collect();
-    let at = head.iter().position(|&own| own == name).unwrap();
-    let time = head.iter().position(|&own| own == "time").unwrap();
+    let at = head.iter().position(|&known| known == name).unwrap();
+    let time = head.iter().position(|&known| known == "time").unwrap();
     let rows = rows.map(|row| row.split(',').map(|x| x.parse::<f64>().unwrap()).collect::<Vec<_>>());
     rows.filter(|row| row[time] >= from).map(|row| row[at]).collect()
 }

@@ -8,7 +8,7 @@ use tempfile::TempDir;
 fn warnings(text: &str) -> (Vec<String>, Vec<f64>) {
     let out = TempDir::new().unwrap();
     let summary = run(text, out.path());
-    (summary.warnings, summary.volume_changes.iter().map(|own| own.change).collect())
+    (summary.warnings, summary.volume_changes.iter().map(|volume| volume.change).collect())
 }
 
 /// A sheet of 0.1 mm pressed in its plane far beyond its buckling load stays flat, an equilibrium that no

@@ -70,8 +70,8 @@ fn most_and_last(text: &str, column: &str) -> (pliant_run::Summary, f64, f64) {
     let table = std::fs::read_to_string(out.path().join("out/history.csv")).unwrap();
     let mut rows = table.lines().map(|line| line.split(',').collect::<Vec<_>>());
     let column = rows.next().unwrap().iter().position(|name| *name == column).unwrap();
-    let all: Vec<f64> = rows.map(|row| row[column].parse::<f64>().unwrap()).collect();
-    (summary, all.iter().copied().map(f64::abs).fold(0.0, f64::max), all[all.len() - 1].abs())
+    let forces: Vec<f64> = rows.map(|row| row[column].parse::<f64>().unwrap()).collect();
+    (summary, forces.iter().copied().map(f64::abs).fold(0.0, f64::max), forces[forces.len() - 1].abs())
 }
 
 /// Returns the warnings that something was held back.

@@ -111,8 +111,9 @@ fn checkpoints(seeds: std::ops::Range<u64>, attempts: &mut Attempts) {
 
 /// The files of a folder.
 fn files(folder: &Path) -> Vec<(std::path::PathBuf, Vec<u8>)> {
-    let all = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).filter(|path| path.is_file());
-    all.map(|path| (path.clone(), fs::read(path).unwrap())).collect()
+    let paths =
+        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).filter(|path| path.is_file());
+    paths.map(|path| (path.clone(), fs::read(path).unwrap())).collect()
 }
 
 #[test]

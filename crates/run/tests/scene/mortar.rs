@@ -250,7 +250,7 @@ fn methods_that_do_not_fit_are_refused_by_name() {
     let with = |more: &str| text.replace("[tie.t]", &format!("[tie.t]\n{more}"));
     let line = format!("nodes = {{ nearest = {{ point = [0.01, 0.01, {SIZE}], count = 1 }} }}");
     let coat = super::ties::coated("solver = 'static'", "cells = [7, 5]", "");
-    let all = [
+    let cases = [
         (with("method = 'mortars'"), ["method", "did you mean \"mortar\"?"]),
         (with("method = 3"), ["expected \"mortar\" or \"points\"", "found 3"]),
         (with("methods = 'mortar'"), ["methods", "did you mean `method`?"]),
@@ -263,7 +263,7 @@ fn methods_that_do_not_fit_are_refused_by_name() {
             ["`coat` is a membrane", "take `method = \"points\"`"],
         ),
     ];
-    for (text, pieces) in all {
+    for (text, pieces) in cases {
         crate::assert_refused(&text, &pieces);
     }
     // A selection of a line of nodes is tied as points.

@@ -170,7 +170,8 @@ fn played(model: &str) -> Trajectory {
     let rest: Vec<Vector3<f64>> = part.model.rest.iter().map(|&x| x.into()).collect();
     let mass = part.model.mass.clone();
     let contacts = part.contacts.clone().unwrap_or_default();
-    let constraints: Vec<String> = part.model.constraints.iter().map(|own| own.name.clone()).collect();
+    let constraints: Vec<String> =
+        part.model.constraints.iter().map(|constraint| constraint.name.clone()).collect();
     let mut simulation = world.simulation().unwrap();
     let mut trajectory = Trajectory::default();
     let mut looks = 0;
@@ -227,8 +228,8 @@ fn played(model: &str) -> Trajectory {
 /// Returns the largest depth of a node of a body in another body [m].
 fn deepest(meshes: &[Mesh], firsts: &[u32], places: &[Vector3<f64>]) -> f64 {
     let moved = |mesh: &Mesh, first: u32| {
-        let own = &places[first as usize..first as usize + mesh.points.len()];
-        Mesh { points: own.to_vec(), ..mesh.clone() }
+        let placed = &places[first as usize..first as usize + mesh.points.len()];
+        Mesh { points: placed.to_vec(), ..mesh.clone() }
     };
     let solids: Vec<Mesh> = meshes
         .iter()
@@ -578,10 +579,13 @@ fn membranes_carry_their_part_of_a_force() {
     let end = grid.at(0, 0.1);
     let flat = |z: f64| -> Vec<usize> {
         // Triangles of the cells' faces in the plane.
-        let all = grid.cells.iter().flat_map(|cell| {
+        let triangles = grid.cells.iter().flat_map(|cell| {
             [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]].map(|face: [usize; 3]| face.map(|a| cell[a]))
         });
-        all.filter(|face| face.iter().all(|&node| (grid.nodes[node][2] - z).abs() < 1e-9)).flatten().collect()
+        triangles
+            .filter(|face| face.iter().all(|&node| (grid.nodes[node][2] - z).abs() < 1e-9))
+            .flatten()
+            .collect()
     };
     let faces = [flat(0.0), flat(0.1)].concat();
     for (kind, parameters, its) in [

@@ -160,7 +160,7 @@ fn without_tables_solids_and_shells_are_participants_of_the_run() {
     let names: Vec<&str> = two.participants.iter().map(|part| part.name.as_str()).collect();
     assert_eq!(names, ["solids", "shells"]);
     let steps: Vec<u64> = two.participants.iter().map(|part| part.plan.steps.number).collect();
-    assert!(steps.iter().all(|own| own.is_multiple_of(two.steps())), "{steps:?}");
+    assert!(steps.iter().all(|number| number.is_multiple_of(two.steps())), "{steps:?}");
     assert!(steps.contains(&two.steps()));
 }
 

@@ -110,25 +110,25 @@ fn held(random: &mut Random, equations: bool) -> String {
 /// A floor, and perhaps a finger.
 fn touched(random: &mut Random, in_time: bool) -> String {
     let friction = one(random, &["", "friction = 0.3\n", "friction = 0.6\n"]);
-    let mut all = format!(
+    let mut tables = format!(
         "[obstacle.floor]\nshape = 'half-space'\n[contact.floor]\nbetween = ['c', 'floor']\n{friction}"
     );
     if random.below(2) == 0 {
-        all += &format!(
+        tables += &format!(
             "[tool.finger]\nshape = {{ sphere = {{ radius = 0.005 }} }}\nat = [0.01, 0.01, 0.013]\nby = [0.002, 0, -0.003]\n{}\
              [contact.finger]\nbetween = ['c', 'finger']\n{}",
             if in_time { one(random, &["", "force-limit = 0.05\n"]) } else { "" },
             one(random, &["", "friction = 0.4\n"])
         );
     }
-    all
+    tables
 }
 
 /// Perhaps a cord in the cube, and a skin on it.
 fn joined(random: &mut Random, equations: bool, damping: &str) -> String {
-    let mut all = String::new();
+    let mut tables = String::new();
     if random.below(3) == 0 {
-        all += &format!(
+        tables += &format!(
             "[law.thread]\ntype = 'neo-hookean'\nyoung-modulus = 1e5\npoisson-ratio = 0.3\n\
              [body.cord]\nmodel = 'bar'\nmesh = {{ lines = [[[0.003, 0.01, 0.004], [0.017, 0.01, 0.004]]], edge = 0.006 }}\n\
              law = 'thread'\narea = 1e-6\ndensity = 1000\n{damping}[tie.cord]\nbetween = ['cord', 'c']\n"
@@ -136,12 +136,12 @@ fn joined(random: &mut Random, equations: bool, damping: &str) -> String {
     }
     if equations && random.below(3) == 0 {
         let model = one(random, &["membrane", "shell"]);
-        all += &format!(
+        tables += &format!(
             "[law.skin]\ntype = 'neo-hookean'\nyoung-modulus = 1e5\npoisson-ratio = 0.3\n\
              [body.skin]\nmodel = '{model}'\non = 'c'\nfaces = {{ set = 'x-min' }}\nlaw = 'skin'\nthickness = 2e-4\ndensity = 1000\n"
         );
     }
-    all
+    tables
 }
 
 /// Looks at random scenes while they run, and resumes them there. Scenes that cannot be built or fail are

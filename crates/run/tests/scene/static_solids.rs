@@ -116,8 +116,8 @@ fn relaxing_equilibria_are_those_of_dynamic_relaxation() {
             [&newton, &relaxed],
             &[("displacement", 1e-6), ("stress", 1e-5), ("reaction.", 1e-5)],
         );
-        let [own, other] = [&newton, &relaxed].map(|row| row["energy.internal"]);
-        println!("{element}: internal energy {own:.6e}, {other:.6e} J");
+        let [direct, other] = [&newton, &relaxed].map(|row| row["energy.internal"]);
+        println!("{element}: internal energy {direct:.6e}, {other:.6e} J");
     }
 }
 
@@ -181,8 +181,8 @@ fn shells_and_solids_go_together() {
     assert!(of(CellKind::Triangle, "thickness").iter().all(|value| *value == 1e-3));
     let has = |kind: CellKind, name: &str| mesh.block(kind).unwrap().data.contains_key(name);
     assert!(!has(CellKind::Hex, "thickness") && !has(CellKind::Triangle, "pk2-stress"));
-    let (own, together) = (last_row(&alone), last_row(&both));
-    for (name, value) in own.iter().filter(|(name, _)| name.starts_with("probe")) {
+    let (apart, together) = (last_row(&alone), last_row(&both));
+    for (name, value) in apart.iter().filter(|(name, _)| name.starts_with("probe")) {
         assert!((value - together[name]).abs() <= 1e-7 * value.abs().max(1e-3), "{name}: {value}");
     }
 }

@@ -248,8 +248,8 @@ fn moved(text: &str) -> (Vec<[[f64; 3]; 2]>, std::collections::BTreeMap<String, 
     let frame = pliant_geometry::io::read(&files.max().unwrap()).unwrap().mesh;
     let moved = &frame.point_data["displacement"];
     let item = |at: usize| moved.item(at).try_into().unwrap();
-    let all = frame.points.iter().enumerate().map(|(at, &point)| [point.into(), item(at)]);
-    (all.collect(), pliant_testing::scenes::last_row_in(out.path()))
+    let points = frame.points.iter().enumerate().map(|(at, &point)| [point.into(), item(at)]);
+    (points.collect(), pliant_testing::scenes::last_row_in(out.path()))
 }
 
 /// A block of crooked tets is stretched freely, with a wall of no stiffness tied to its top, on its triangles
@@ -272,15 +272,15 @@ fn a_uniform_strain_passes_through_ties() {
                 .replace("young-modulus = 1e6", "young-modulus = 1e-9")
                 .replace("model = 'membrane'", &format!("model = '{model}'"))
                 .replace("'block'\nnodes = 'all'", &format!("'block'\nnodes = {}", side(1, false)));
-            let (all, _) = moved(&text);
-            let far = all.iter().find(|[x, _]| (0..3).all(|c| (x[c] - BLOCK[c]).abs() < 1e-9)).unwrap();
+            let (points, _) = moved(&text);
+            let far = points.iter().find(|[x, _]| (0..3).all(|c| (x[c] - BLOCK[c]).abs() < 1e-9)).unwrap();
             let strain = [0, 1, 2].map(|c| far[1][c] / far[0][c]);
             assert!(
                 (strain[0] - 0.1).abs() < 1e-12
                     && strain[1] < -0.03
                     && (strain[1] / strain[2] - 1.0).abs() < 1e-9
             );
-            for [point, moved] in all {
+            for [point, moved] in points {
                 for c in 0..3 {
                     let off = (moved[c] - strain[c] * point[c]).abs();
                     assert!(off < 1e-10 * 0.04, "{coat} {model} {solver}: {off:e} m at {point:?}");
@@ -326,10 +326,10 @@ fn coats_in_equilibrium_keep_a_uniform_strain() {
             );
             let text = from_file(&coated(solver, coat, &wide), &file)
                 .replace("'block'\nnodes = 'all'", &format!("'block'\nnodes = {}", side(1, false)));
-            let (all, row) = moved(&text);
+            let (points, row) = moved(&text);
             let across = stretch_across([1.1, 1.05]);
             let strain = [0.1, 0.05, across - 1.0];
-            let off = all.iter().flat_map(|[x, u]| [0, 1, 2].map(|c| (u[c] - strain[c] * x[c]).abs()));
+            let off = points.iter().flat_map(|[x, u]| [0, 1, 2].map(|c| (u[c] - strain[c] * x[c]).abs()));
             let off = off.fold(0.0, f64::max) / 0.04;
             let force = row["reaction.end.x"] / pull([1.1, 1.05, across]) - 1.0;
             println!("{coat} {solver}: {off:.1e} of the length, force {force:.1e}");
@@ -372,8 +372,8 @@ fn a_sheet_across_a_block_keeps_a_uniform_strain() {
             "mesh = { plate = { size = [0.04, 0.02], cells = [1, 1] }, at = [0, 0, 0.01] }",
             &format!("mesh = {{ file = '{}' }}", sheet.display()),
         );
-        let (all, row) = moved(&text);
-        let off = all.iter().flat_map(|[x, u]| affine(x).into_iter().zip(u).map(|(a, b)| (a - b).abs()));
+        let (points, row) = moved(&text);
+        let off = points.iter().flat_map(|[x, u]| affine(x).into_iter().zip(u).map(|(a, b)| (a - b).abs()));
         let off = off.fold(0.0, f64::max) / 0.04;
         println!("{solver}: {off:.1e} of the length");
         assert!(off < 1e-8 && row["probe.coat.membrane-force.xx"] > 10.0, "{row:?}");

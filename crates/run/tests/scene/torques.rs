@@ -53,7 +53,7 @@ fn a_ball_without_friction_feels_no_torque_and_a_block_that_of_its_corner() {
     let [explicit, implicit] =
         ["", IMPLICIT].map(|run| pressed("{ box = { size = [0.02, 0.02, 0.02] } }", run));
     // The nodes under it lie toward −y and +x of its middle: they turn it about −x and −y.
-    let [a, b] = [explicit, implicit].map(|own| own.torque.unwrap().map(|m| m / own.force[2]));
+    let [a, b] = [explicit, implicit].map(|result| result.torque.unwrap().map(|m| m / result.force[2]));
     for c in 0..2 {
         // Barriers act from farther away than impulses.
         assert!(a[c] < -1e-3 && (a[c] - b[c]).abs() < 0.2 * a[c].abs(), "{a:?} m, {b:?} m");

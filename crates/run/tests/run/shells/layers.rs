@@ -12,7 +12,7 @@ pub(super) const ALONG: &str = "fibre = [1, 0, 0.2]\nlayers = [{ thickness = 0.0
 
 /// The cantilever of layers with a force at its end.
 pub(super) fn layered(layers: &str, changes: &[(&str, &str)]) -> Workshop {
-    let own = [
+    let edits = [
         (THICK, layers),
         (
             "poisson-ratio = 0.3",
@@ -21,7 +21,7 @@ pub(super) fn layered(layers: &str, changes: &[(&str, &str)]) -> Workshop {
         ("type = \"pressure\"", "type = \"force\""),
         ("faces = \"all\"\npressure = 1", "nodes = { set = \"x-max\" }\ntotal = [0, 0, 1e-6]"),
     ];
-    wall(&[&own[..], changes].concat())
+    wall(&[&edits[..], changes].concat())
 }
 
 /// The deflection is P L³/(3 E I) with E I about the neutral axis of two layers (Timoshenko 1925). Layers
@@ -34,9 +34,9 @@ pub(super) fn a_wall_of_layers_bends_as_a_beam_of_two_materials() {
         *rows.last().unwrap().last().unwrap()
     };
     let neutral: f64 = 0.0005 * 3.0 / 5.0;
-    let (own, area) = (0.1 * 0.001_f64.powi(3) / 12.0, 0.1 * 0.001);
-    let rigidity =
-        1e6 * (own + area * (0.0005 + neutral).powi(2)) + 4e6 * (own + area * (0.0005 - neutral).powi(2));
+    let (inertia, area) = (0.1 * 0.001_f64.powi(3) / 12.0, 0.1 * 0.001);
+    let rigidity = 1e6 * (inertia + area * (0.0005 + neutral).powi(2))
+        + 4e6 * (inertia + area * (0.0005 - neutral).powi(2));
     let exact = 1e-6 * 0.2_f64.powi(3) / (3.0 * rigidity);
     for layers in [LAYERS, ALONG] {
         let workshop = layered(layers, &[]);

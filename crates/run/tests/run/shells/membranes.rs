@@ -140,8 +140,8 @@ pub(super) fn large_strains_are_told() {
     assert!(largest > 0.5 && largest < 0.7, "{strain}");
     // 5 % a load step.
     assert!((strain["above_from"].as_f64().unwrap() - 0.3).abs() < 1e-9, "{strain}");
-    let mut warnings = json["warnings"].as_array().unwrap().iter().map(|own| own.as_str().unwrap());
-    let warning = warnings.find(|own| own.contains("is strained by")).unwrap();
+    let mut warnings = json["warnings"].as_array().unwrap().iter().map(|text| text.as_str().unwrap());
+    let warning = warnings.find(|text| text.contains("is strained by")).unwrap();
     let wanted = format!("in triangle {} (counted from 0) at t = 1.000 s", strain["element"]);
     for piece in ["`wall` is strained by", &wanted, "by more than 10 % from t = 0.3000 s on"] {
         assert!(warning.contains(piece), "no `{piece}` in {warning}");
@@ -160,7 +160,11 @@ pub(super) fn large_strains_are_told() {
     // A thin wall that is clamped and pulled has unstable equilibria by its triangles; it has no other
     // warning.
     let warnings = json["warnings"].as_array().unwrap();
-    assert!(warnings.iter().all(|own| own.as_str().unwrap().contains("are unstable")), "{}", output.err);
+    assert!(
+        warnings.iter().all(|warning| warning.as_str().unwrap().contains("are unstable")),
+        "{}",
+        output.err
+    );
     assert!(json["shell_strains"][0]["above_from"].is_null(), "{json}");
     assert!(page.contains("| wall | 1."), "{page}");
 }

@@ -116,12 +116,12 @@ fn off(points: &[[f64; 3]], cells: &[&[u32]]) -> String {
 
 /// The messages of a scene with a shell from a file.
 fn from_file(points: &[[f64; 3]], cells: &[&[u32]], changes: &[(&str, &str)]) -> Told {
-    let own = [
+    let edits = [
         (PLATE, "mesh = { file = \"wall.off\" }"),
         ("{ set = \"x-min\" }", "{ nearest = { point = [0, 0, 0], count = 3 } }"),
         ("at = [0.2, 0.05, 0]", "at = [0.1, 0.1, 0]"),
     ];
-    let workshop = wall(&[&own, changes].concat());
+    let workshop = wall(&[&edits, changes].concat());
     workshop.write("case/wall.off", off(points, cells));
     workshop.run(&[])
 }
@@ -580,8 +580,8 @@ fn an_explicit_plate_swings_about_its_equilibrium() {
     let done = swinging.run(&[]).done();
     assert!(done["steps"].as_u64().unwrap() > 1000, "{done}");
     let (_, rows) = swinging.table("out/case/history.csv");
-    let all = rows.iter().map(|row| row.last().unwrap() / rest);
-    let (low, high) = all.fold((0.0_f64, 0.0_f64), |(low, high), z| (low.min(z), high.max(z)));
+    let deflections = rows.iter().map(|row| row.last().unwrap() / rest);
+    let (low, high) = deflections.fold((0.0_f64, 0.0_f64), |(low, high), z| (low.min(z), high.max(z)));
     assert!(high > 1.9 && high < 2.2 && low > -0.2, "{low} to {high} of the deflection at rest");
 }
 

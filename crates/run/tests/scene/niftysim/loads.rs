@@ -133,9 +133,9 @@ pub(super) fn gravity_is_an_acceleration_along_a_unit_vector() {
         );
         imported(&with(&more))
     };
-    let all = gravity("NumNodes=\"all\"", "");
-    assert_lines(&all, &["on = \"model\"", "acceleration = [0.0, 0.0, -10.0]", "curve = \"hold\""]);
-    build(&all);
+    let whole = gravity("NumNodes=\"all\"", "");
+    assert_lines(&whole, &["on = \"model\"", "acceleration = [0.0, 0.0, -10.0]", "curve = \"hold\""]);
+    build(&whole);
     let some = gravity("NumNodes=\"2\"", "<Nodes>0 1</Nodes>");
     assert_lines(&some, &["nodes = { set = \"gravity-0\" }", "acceleration = [0.0, 0.0, -10.0]"]);
     build(&some);

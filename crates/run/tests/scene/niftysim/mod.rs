@@ -482,14 +482,14 @@ fn every_sample_is_imported_and_none_panics_when_damaged() {
         import(&path).unwrap_or_else(|error| panic!("{error}"));
         damage(&fs::read(&path).unwrap(), &folder, 60);
     }
-    let all = with(
+    let everything = with(
         "<Constraint Type=\"Pressure\" NumFaces=\"1\" FaceType=\"Tri\" LoadShape=\"HILLY\"><Faces>0 1 3</Faces>\
          <Magnitude>7</Magnitude></Constraint><Constraint Type=\"Fix\" SpecType=\"NORMAL\">\
          <Normal ToleranceAngle=\"9\">0 0 1</Normal><RestrictTo Type=\"Box\">-1 1 -1 1 -1 1</RestrictTo></Constraint>\
          <Constraint Type=\"Gravity\" NumNodes=\"all\" LoadShape=\"STEP\"><AccelerationMagnitude>9</AccelerationMagnitude>\
          <AccelerationDirection>0 0 1</AccelerationDirection></Constraint><Output Freq=\"3\"><Variable>U</Variable></Output>",
     );
-    damage(all.as_bytes(), &folder, 900);
+    damage(everything.as_bytes(), &folder, 900);
     let merger = "<SubModelNodeMergerDistance>0.1</SubModelNodeMergerDistance>";
     let submodels = format!("<Model>{merger}{}{}{SYSTEM}</Model>", submodel(0.0, ""), submodel(1.01, ""));
     damage(submodels.as_bytes(), &folder, 600);

@@ -50,9 +50,9 @@ pub(super) fn contact_and_membranes_become_tables() {
     assert_lines(&imported, &touch);
     let sheet = ["faces = { set = \"surface-0\" }", "friction = 0.2", "thickness = 0.001"];
     assert_lines(&imported, &sheet);
-    let own =
+    let itself =
         ["[contact.model-itself]", "between = [\"model\", \"model\"]", "friction = 0.3", "thickness = 0.001"];
-    assert_lines(&imported, &own);
+    assert_lines(&imported, &itself);
     assert_lines(&imported, &["type = \"neo-hookean\"", "young-modulus = 1500.0", "poisson-ratio = 0.5"]);
     assert_lines(
         &imported,
