@@ -77,7 +77,7 @@ fn main() -> Result<(), Failed> {
     out.as_deref().map(std::fs::create_dir_all).transpose()?;
     let (mut meshes, mut crossing, mut crossing_triangles) = (0, 0, 0);
     for (name, file, body) in BODIES {
-        if !names.is_empty() && !names.iter().any(|own| name.contains(own.as_str())) {
+        if !names.is_empty() && !names.iter().any(|wanted| name.contains(wanted.as_str())) {
             continue;
         }
         let (read, diagonal) = read(&folder, file, body)?;
@@ -88,15 +88,19 @@ fn main() -> Result<(), Failed> {
             let anatomy = read.anatomy(edge)?;
             let made = OrganTets::new(edge).mesh(&anatomy, &|_| {})?;
             let report = &made.report;
-            let volumes = report.materials.iter().filter_map(|own| Some((own.volume, own.voxel_volume?)));
-            let [own, given] = volumes.fold([0.0; 2], |sums, (own, given)| [sums[0] + own, sums[1] + given]);
+            let volumes = report
+                .materials
+                .iter()
+                .filter_map(|material| Some((material.volume, material.voxel_volume?)));
+            let [meshed, given] =
+                volumes.fold([0.0; 2], |sums, (meshed, given)| [sums[0] + meshed, sums[1] + given]);
             println!(
                 "{name:<20} {:6.2} mm {:6} tets, acoustic {:.3}, volume {:+.2} %, Euler number {:4} (body {:4}), \
                  {:3} faces cross, {} tears closed, {} left, {} touch, {:.1} s",
                 edge * 1e3,
                 report.tets,
                 report.acoustic_part,
-                (own / given - 1.0) * 100.0,
+                (meshed / given - 1.0) * 100.0,
                 report.surface.euler_number,
                 report.surface.of_body.unwrap_or(0),
                 report.surface.self_intersections,
@@ -111,8 +115,8 @@ fn main() -> Result<(), Failed> {
             let mut surface = TriangleMesh::of_field(anatomy.field(), 0.5 * edge, usize::MAX)?;
             surface.remesh(edge, usize::MAX)?;
             let surface = SurfaceCheck::of(&surface.to_mesh());
-            let of = |own: &SurfaceCheck| {
-                format!("Euler number {}, {} faces cross", own.euler_number, own.self_intersections)
+            let of = |check: &SurfaceCheck| {
+                format!("Euler number {}, {} faces cross", check.euler_number, check.self_intersections)
             };
             println!("{:<20} hexes: {}; triangles: {}", "", of(&hexes), of(&surface));
             crossing_triangles += usize::from(surface.self_intersections > 0);

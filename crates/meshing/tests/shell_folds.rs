@@ -50,9 +50,9 @@ fn normals(mesh: &Mesh) -> (f64, usize) {
     let mut largest = 0.0_f64;
     for nodes in mesh.block(CellKind::Triangle).unwrap().cells() {
         let [a, b, c] = [0, 1, 2].map(|k| mesh.points[nodes[k] as usize]);
-        let own = (b - a).cross(&(c - a));
+        let flat = (b - a).cross(&(c - a));
         let given = nodes.iter().map(|&n| normal(n)).filter(|n| *n != Vector3::zeros());
-        largest = given.map(|n| n.angle(&own).to_degrees()).fold(largest, f64::max);
+        largest = given.map(|n| n.angle(&flat).to_degrees()).fold(largest, f64::max);
     }
     let nodes = 0..mesh.points.len() as u32;
     (largest, nodes.filter(|&n| normal(n) == Vector3::zeros()).count())
@@ -114,8 +114,8 @@ impl ImplicitField for Vessels {
 fn a_large_organ_with_vessels_is_fitted_without_crossings() {
     let surface = TriangleMesh::of_field(&Vessels, 0.0012, DEFAULT_CELL_LIMIT).unwrap();
     let rounds = std::cell::Cell::new(0);
-    let told = |progress: pliant_meshing::FitProgress| rounds.set(progress.round);
-    let report = FittedShells::new(&surface, ShellGoal::Error(0.0035), &told).unwrap().report;
+    let on_progress = |progress: pliant_meshing::FitProgress| rounds.set(progress.round);
+    let report = FittedShells::new(&surface, ShellGoal::Error(0.0035), &on_progress).unwrap().report;
     println!("{report}");
     assert_eq!(report.rounds, rounds.get());
     assert!(
@@ -148,7 +148,7 @@ fn shells_of_a_fold_do_not_cross_where_the_goal_is_out_of_reach() {
     let off = report.distances.largest() / report.diagonal;
     assert_eq!(report.reached, off <= 0.01);
     if !report.reached {
-        let told = format!("at best {:.3} % reached", 100.0 * off);
-        assert!(report.warnings()[0].contains(&told), "{report}");
+        let message = format!("at best {:.3} % reached", 100.0 * off);
+        assert!(report.warnings()[0].contains(&message), "{report}");
     }
 }

@@ -26,7 +26,7 @@ fn percent(report: &ShellReport) -> [f64; 2] {
     [report.distances.largest_forward, report.distances.largest_backward].map(|x| 100.0 * x / report.diagonal)
 }
 
-fn told(name: &str, target: &TriangleMesh, goal: ShellGoal) -> FittedShells {
+fn fit(name: &str, target: &TriangleMesh, goal: ShellGoal) -> FittedShells {
     let start = Instant::now();
     let fitted = FittedShells::new(target, goal, &|_| {}).unwrap();
     println!("{name} {goal:?}: {:.1} s\n{}", start.elapsed().as_secs_f64(), fitted.report);
@@ -62,7 +62,7 @@ fn an_open_cylinder_by_12_and_48_shells() {
 /// Halved, moved and fitted, nodes of the rims stay there too.
 #[test]
 fn nodes_of_a_rim_stay_on_it() {
-    let fitted = told("cylinder", &cylinder([320, 80]), ShellGoal::Error(0.002));
+    let fitted = fit("cylinder", &cylinder([320, 80]), ShellGoal::Error(0.002));
     assert!(fitted.report.reached, "{}", fitted.report);
     let rim = rim(&fitted.mesh);
     assert!(rim.len() >= 12 && rim.iter().all(|x| off_the_rim(x) < 1e-9));
@@ -84,7 +84,7 @@ fn the_phantom_liver() {
     let liver = Phantom::new(Organ::Liver, 1.0).unwrap();
     let fine = TriangleMesh::of_field(&liver, 0.004, DEFAULT_CELL_LIMIT).unwrap();
     for (error, most) in [(0.006, 400), (0.0035, 700)] {
-        let report = told("phantom liver", &fine, ShellGoal::Error(error)).report;
+        let report = fit("phantom liver", &fine, ShellGoal::Error(error)).report;
         assert!(report.reached && percent(&report).iter().all(|&off| off <= 100.0 * error), "{report}");
         assert!(report.shells <= most && report.shape[0] >= 0.6, "{report}");
     }

@@ -92,35 +92,36 @@ impl EnclosedReport {
 
 impl fmt::Display for EnclosedReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut told = vec![self.repairs.to_string()];
+        let mut notes = vec![self.repairs.to_string()];
         if self.repairs == SurfaceRepairs::default() {
-            told.clear();
+            notes.clear();
         }
         if self.closed_holes > 0 {
             let holes = counted(self.closed_holes, "hole", "holes");
-            told.push(format!("{holes} of up to {:.2} mm closed", self.widest_hole * 1e3));
+            notes.push(format!("{holes} of up to {:.2} mm closed", self.widest_hole * 1e3));
         }
         if let Some(place) = self.first_crossing {
             let [x, y, z] = place.map(|x| x * 1e3);
             let pairs = counted(self.crossings, "pair", "pairs");
-            told.push(format!(
+            notes.push(format!(
                 "{pairs} of triangles intersect, the first at ({x:.2}, {y:.2}, {z:.2}) mm: overlapping parts \
                  were joined"
             ));
         }
         if self.swallowed_shells > 0 {
-            told.push(format!(
+            notes.push(format!(
                 "{} joined with an enclosing piece",
                 counted(self.swallowed_shells, "piece", "pieces")
             ));
         }
         if self.filled_cavities > 0 {
-            told.push(format!("{} filled", counted(self.filled_cavities, "cavity", "cavities")));
+            notes.push(format!("{} filled", counted(self.filled_cavities, "cavity", "cavities")));
         }
         if self.dropped_pieces > 0 {
-            told.push(format!("{} dropped", counted(self.dropped_pieces, "smaller piece", "smaller pieces")));
+            notes
+                .push(format!("{} dropped", counted(self.dropped_pieces, "smaller piece", "smaller pieces")));
         }
-        f.write_str(&if told.is_empty() { "nothing".to_owned() } else { told.join("; ") })
+        f.write_str(&if notes.is_empty() { "nothing".to_owned() } else { notes.join("; ") })
     }
 }
 
@@ -430,13 +431,13 @@ pub(crate) fn sign(grid: &Grid, winding: &Winding, distances: &mut [f32]) {
     distances.par_chunks_exact_mut(nx).enumerate().for_each(|(row, line)| {
         let (mut inside, mut before) = (false, 0.0);
         for (i, value) in line.iter_mut().enumerate() {
-            let own = f64::from(*value);
+            let distance = f64::from(*value);
             // Half a step for the gaps where intersecting triangles were divided.
-            if i > 0 && before + own <= 1.5 * step {
+            if i > 0 && before + distance <= 1.5 * step {
                 let point = grid.position(&Vector3::from(grid.triple(row * nx + i).map(|i| i as f64)));
                 inside = winding.at(&point) > 0.5;
             }
-            before = own;
+            before = distance;
             if !inside {
                 *value = -*value;
             }

@@ -103,9 +103,11 @@ impl Patches {
     /// Some of its triangles with the points they use.
     pub(crate) fn only(&self, chosen: impl Fn([i32; 2]) -> bool) -> Self {
         let (mut triangles, mut sides) = (Vec::new(), Vec::new());
-        for (triangle, own) in self.triangles.iter().zip(&self.sides).filter(|(_, own)| chosen(**own)) {
+        for (triangle, labels) in
+            self.triangles.iter().zip(&self.sides).filter(|(_, labels)| chosen(**labels))
+        {
             triangles.push(*triangle);
-            sides.push(*own);
+            sides.push(*labels);
         }
         let mut used = triangles.concat();
         used.sort_unstable();
@@ -165,10 +167,10 @@ fn faces_of_voxels(grid: &Grid, materials: &[u8], label: &dyn Fn(u8) -> i32) -> 
     // Corners of voxels, one more along each axis than there are voxels.
     let corner = |[i, j, k]: [usize; 3]| i as u64 + (nx as u64 + 1) * (j as u64 + (ny as u64 + 1) * k as u64);
     let (mut quads, mut sides): (Vec<[u64; 4]>, Vec<[i32; 2]>) = Default::default();
-    for (at, &own) in materials.iter().enumerate() {
+    for (at, &material) in materials.iter().enumerate() {
         let here = grid.triple(at);
         for axis in 0..3 {
-            if here[axis] + 1 == grid.dims[axis] || materials[at + strides[axis]] == own {
+            if here[axis] + 1 == grid.dims[axis] || materials[at + strides[axis]] == material {
                 continue;
             }
             let [u, v] = [(axis + 1) % 3, (axis + 2) % 3];
@@ -180,7 +182,7 @@ fn faces_of_voxels(grid: &Grid, materials: &[u8], label: &dyn Fn(u8) -> i32) -> 
                 corner(place)
             };
             quads.push([shifted(0, 0), shifted(1, 0), shifted(1, 1), shifted(0, 1)]);
-            sides.push(sorted([label(own), label(materials[at + strides[axis]])]));
+            sides.push(sorted([label(material), label(materials[at + strides[axis]])]));
         }
     }
     let mut used = quads.concat();
@@ -222,7 +224,7 @@ mod tests {
         materials[2 + 4 * (1 + 3)] = 2;
         let given = Given::Voxels { grid, materials };
         let patches = given.patches(&[7, 5]);
-        let only = |sides: [i32; 2]| patches.only(|own| own == sides);
+        let only = |sides: [i32; 2]| patches.only(|labels| labels == sides);
         let count = |sides: [i32; 2]| only(sides).triangles.len();
         assert_eq!([count([0, 5]), count([0, 7]), count([5, 7])], [10, 10, 2]);
         let inner = only([5, 7]);

@@ -52,9 +52,9 @@ impl<'a> Surfaces<'a> {
         if self.near.is_far(material, point) {
             return -self.edge;
         }
-        let own = self.depth(material, point);
+        let depth = self.depth(material, point);
         let others = self.near.of(point).filter(|&other| other != material);
-        own - others.map(|other| self.depth(other, point)).fold(-f64::MAX, f64::max)
+        depth - others.map(|other| self.depth(other, point)).fold(-f64::MAX, f64::max)
     }
 
     /// The material that a point is deepest in.

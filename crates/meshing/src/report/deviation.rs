@@ -243,8 +243,9 @@ impl Near {
 
     /// Distance to the nearest point [m]; infinite without any.
     fn distance(&self, from: &Vector3) -> f64 {
-        let own = cube(from, self.edge);
-        let near = (0..27).map(|at| [own[0] + at % 3 - 1, own[1] + at / 3 % 3 - 1, own[2] + at / 9 - 1]);
+        let middle = cube(from, self.edge);
+        let near =
+            (0..27).map(|at| [middle[0] + at % 3 - 1, middle[1] + at / 3 % 3 - 1, middle[2] + at / 9 - 1]);
         let near = near.filter_map(|cube| self.cubes.get(&cube)).flatten();
         let nearest = near.map(|&at| (self.points[at as usize] - from).norm()).fold(f64::INFINITY, f64::min);
         // Points farther than an edge may be nearer in other cubes.
@@ -333,8 +334,8 @@ mod tests {
     fn a_ball_and_a_smaller_one_are_as_far_apart_as_their_radii() {
         let ball = |radius| Ellipsoid { centre: Vector3::zeros(), radii: Vector3::repeat(radius) };
         let mesh = Stuffing::new(0.004).mesh(&ball(0.04)).unwrap().mesh;
-        let own = Deviation::new(&mesh, &ball(0.04), 0.004).unwrap();
-        assert!(own.largest_from_mesh < 2e-4 && own.largest_from_body < 2e-4, "{own:?}");
+        let deviation = Deviation::new(&mesh, &ball(0.04), 0.004).unwrap();
+        assert!(deviation.largest_from_mesh < 2e-4 && deviation.largest_from_body < 2e-4, "{deviation:?}");
         let other = Deviation::new(&mesh, &ball(0.05), 0.004).unwrap();
         for distance in
             [other.largest_from_mesh, other.rms_from_mesh, other.largest_from_body, other.rms_from_body]

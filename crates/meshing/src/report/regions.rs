@@ -107,8 +107,8 @@ impl Regions {
 }
 
 /// Pairs of labels between which there are faces.
-fn pairs(all: &[&Patches]) -> Vec<[i32; 2]> {
-    let mut pairs: Vec<[i32; 2]> = all.iter().flat_map(|patches| &patches.sides).copied().collect();
+fn pairs(surfaces: &[&Patches]) -> Vec<[i32; 2]> {
+    let mut pairs: Vec<[i32; 2]> = surfaces.iter().flat_map(|patches| &patches.sides).copied().collect();
     pairs.sort_unstable();
     pairs.dedup();
     pairs

@@ -43,7 +43,7 @@ impl SurfaceCheck {
 
     /// The numbers in words.
     pub fn line(&self) -> String {
-        let of_body = self.of_body.map_or_else(String::new, |own| format!(" (body: {own})"));
+        let of_body = self.of_body.map_or_else(String::new, |number| format!(" (body: {number})"));
         let Self { euler_number, self_intersections, .. } = self;
         format!(
             "surface          Euler number {euler_number}{of_body}, {self_intersections} faces intersect others"
@@ -63,10 +63,10 @@ impl SurfaceCheck {
 
 /// V − E + F of the triangles: 2 for each closed piece, less 2 for each handle.
 pub(crate) fn euler_number(triangles: &[[u32; 3]]) -> i64 {
-    let count = |mut all: Vec<[u32; 2]>| {
-        all.sort_unstable();
-        all.dedup();
-        all.len() as i64
+    let count = |mut pairs: Vec<[u32; 2]>| {
+        pairs.sort_unstable();
+        pairs.dedup();
+        pairs.len() as i64
     };
     let edges = triangles.iter().flat_map(|&[a, b, c]| [key(a, b), key(b, c), key(c, a)]).collect();
     let points = triangles.as_flattened().iter().map(|&node| [node; 2]).collect();

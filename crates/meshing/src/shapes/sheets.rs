@@ -403,7 +403,7 @@ mod tests {
         nodes.chunks_exact(3).map(triangle).sum()
     }
 
-    fn all() -> [(Sheet, f64); 5] {
+    fn sheets() -> [(Sheet, f64); 5] {
         [
             (Sheet::Plate { size: [2.0, 3.0] }, 6.0),
             (Sheet::Cylinder { radius: 1.0, length: 2.0, from: 0.0, span: TAU }, 2.0 * TAU),
@@ -416,7 +416,7 @@ mod tests {
     /// Areas to 1 %: chords cut off 0.1 %, and middles of crossed cells bulge.
     #[test]
     fn sheets_have_their_area_and_edges() {
-        for (sheet, exact) in all() {
+        for (sheet, exact) in sheets() {
             for pattern in [Pattern::Diagonal, Pattern::Antidiagonal, Pattern::UnionJack, Pattern::Crossed] {
                 for distortion in [None, Some(Distortion { amount: 0.25, seed: 5 })] {
                     let mesh = sheet.mesh([40, 40], pattern, distortion, DEFAULT_CELL_LIMIT).unwrap();
@@ -429,7 +429,7 @@ mod tests {
 
     #[test]
     fn hemispheres_and_cylinders_face_outwards() {
-        for (sheet, _) in all() {
+        for (sheet, _) in sheets() {
             let mesh = sheet.mesh([8, 4], Pattern::Diagonal, None, DEFAULT_CELL_LIMIT).unwrap();
             let [a, b, c] = [0, 1, 2].map(|i| mesh.points[mesh.blocks[0].nodes[i] as usize]);
             let normal = (b - a).cross(&(c - a));
@@ -445,7 +445,7 @@ mod tests {
     /// normals.
     #[test]
     fn normals_are_those_of_the_sheet() {
-        for (sheet, _) in all() {
+        for (sheet, _) in sheets() {
             let mesh = sheet.mesh([90, 90], Pattern::Diagonal, None, 100_000).unwrap();
             let Some(normals) = mesh.point_data.get("normal") else {
                 assert!(matches!(sheet, Sheet::Plate { .. } | Sheet::Annulus { .. }), "{sheet:?}");

@@ -214,10 +214,14 @@ impl Grid {
         let point_count = self.points_along().iter().product::<usize>() as u32;
         let steps = |point| self.point(point);
         let fraction = |i: usize, n: usize| i as f64 / n as f64;
-        let all = (0..self.cell_count()).map(|number| self.cell(number));
+        let places = (0..self.cell_count()).map(|number| self.cell(number));
         let block = match cells {
-            VolumeCell::Tet => CellBlock::new(CellKind::Tet, all.flat_map(|cell| self.tets(cell)).collect()),
-            VolumeCell::Hex => CellBlock::new(CellKind::Hex, all.flat_map(|cell| self.hex(cell)).collect()),
+            VolumeCell::Tet => {
+                CellBlock::new(CellKind::Tet, places.flat_map(|cell| self.tets(cell)).collect())
+            }
+            VolumeCell::Hex => {
+                CellBlock::new(CellKind::Hex, places.flat_map(|cell| self.hex(cell)).collect())
+            }
         };
         let mut mesh = Mesh {
             points: (0..point_count)

@@ -94,10 +94,10 @@ impl Shells {
                 .collect(),
         );
         let near = |[low, high]: &[Vector3; 2]| {
-            let own: AABB<[f64; 3]> = AABB::from_corners((*low).into(), (*high).into());
-            tree.locate_in_envelope_intersecting(own).next().is_some()
+            let envelope: AABB<[f64; 3]> = AABB::from_corners((*low).into(), (*high).into());
+            tree.locate_in_envelope_intersecting(envelope).next().is_some()
         };
-        alive.iter().zip(&boxes).filter(|(_, own)| near(own)).map(|(&t, _)| t).collect()
+        alive.iter().zip(&boxes).filter(|(_, corners)| near(corners)).map(|(&t, _)| t).collect()
     }
 
     fn crossing_of(
@@ -122,9 +122,9 @@ impl Shells {
         for &t in shells {
             let nodes = self.mesh.triangles[t as usize];
             let patch = self.patch(t);
-            let own: Vec<u32> =
+            let numbers: Vec<u32> =
                 places.iter().map(|&w| numbered(&patch, nodes, w, parts, &mut points, &mut edges)).collect();
-            triangles.extend(pieces.iter().map(|piece| piece.map(|k| own[k as usize])));
+            triangles.extend(pieces.iter().map(|piece| piece.map(|k| numbers[k as usize])));
         }
         (points, triangles)
     }
@@ -148,9 +148,9 @@ impl Shells {
             nodes.dedup();
             let part = step as f64 / STEPS as f64;
             for &node in &nodes {
-                let own = self.normals[node as usize];
+                let normal = self.normals[node as usize];
                 let mean = self.mesh.point_normal(node);
-                tried.normals[node as usize] = own.lerp(&mean, part).try_normalize(0.0).unwrap_or(own);
+                tried.normals[node as usize] = normal.lerp(&mean, part).try_normalize(0.0).unwrap_or(normal);
                 tried.stand(node);
             }
             let then = tried.crossing();

@@ -130,14 +130,14 @@ struct Exchange<'t> {
 }
 
 impl Shells {
-    /// Exchanges shells as long as the largest distance falls, if their requested number is reached. `told`
+    /// Exchanges shells as long as the largest distance falls, if their requested number is reached. `report`
     /// hears this distance [m].
     pub(super) fn exchange(
         &mut self,
         number: usize,
         target: &Target,
         effort: &mut Effort,
-        told: impl Fn(f64),
+        report: impl Fn(f64),
     ) {
         if self.mesh.len() + 1 < number {
             return;
@@ -151,7 +151,7 @@ impl Shells {
             if count <= number && count + 1 >= number && off < nearest {
                 nearest = off;
                 *self = work.shells.clone();
-                told(off);
+                report(off);
             }
             let changes = !work.effort.is_spent()
                 && if count > number { work.collapse(off) } else { work.come_nearer(off) };
@@ -292,14 +292,14 @@ mod tests {
         let start = shells.distances(&target.fine, &target);
         let fitted = shells.settle(start, 0.0, 12, &target, &mut Effort::new(usize::MAX));
         let before = worst(&fitted.far());
-        let told = Cell::new(f64::INFINITY);
+        let reported = Cell::new(f64::INFINITY);
         shells.exchange(even.len(), &target, &mut Effort::new(4_000_000), |off| {
-            assert!(off < told.replace(off));
+            assert!(off < reported.replace(off));
         });
         let after = worst(&shells.distances(&target.fine, &target).far());
         println!("{} shells, {before:.2e} m and {after:.2e} m", even.len());
         assert!(after < 0.25 * before, "{before} {after}");
-        assert!(after <= told.get() && told.get() < 1.1 * after, "{after} {}", told.get());
+        assert!(after <= reported.get() && reported.get() < 1.1 * after, "{after} {}", reported.get());
         let mesh = &shells.mesh;
         assert!(mesh.len() == even.len() || mesh.len() + 1 == even.len(), "{}", mesh.len());
         assert_eq!(mesh.triangles.len(), mesh.len());

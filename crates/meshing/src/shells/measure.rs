@@ -59,25 +59,25 @@ impl Distances {
 
     /// Returns the distances of some shells, increasing, which are numbered anew, and of the points of the
     /// target that are nearest to moving shells.
-    pub(super) fn part(&self, own: &[u32], moves: impl Fn(u32) -> bool) -> Self {
-        let there = own.iter().map(|&t| self.there[t as usize]).collect();
+    pub(super) fn part(&self, shells: &[u32], moves: impl Fn(u32) -> bool) -> Self {
+        let there = shells.iter().map(|&t| self.there[t as usize]).collect();
         let landings = self.landings.iter().filter(|landing| moves(landing.shell)).filter_map(|landing| {
-            Some(Landing { shell: own.binary_search(&landing.shell).ok()? as u32, ..*landing })
+            Some(Landing { shell: shells.binary_search(&landing.shell).ok()? as u32, ..*landing })
         });
         Self { there, parts: self.parts, landings: landings.collect() }
     }
 }
 
 impl Distances {
-    /// Replaces the distances of the shells that moved by the distances of a part. `own` holds the numbers of
-    /// the part's shells here.
-    pub(super) fn put(&mut self, part: &Self, own: &[u32], moved: impl Fn(u32) -> bool) {
-        let count = own.iter().map(|&t| t as usize + 1).fold(self.there.len(), usize::max);
+    /// Replaces the distances of the shells that moved by the distances of a part. `shells` holds the numbers
+    /// of the part's shells here.
+    pub(super) fn put(&mut self, part: &Self, shells: &[u32], moved: impl Fn(u32) -> bool) {
+        let count = shells.iter().map(|&t| t as usize + 1).fold(self.there.len(), usize::max);
         self.there.resize(count, 0.0);
-        own.iter().zip(&part.there).for_each(|(&t, &off)| self.there[t as usize] = off);
+        shells.iter().zip(&part.there).for_each(|(&t, &off)| self.there[t as usize] = off);
         let changed = self.landings.iter_mut().filter(|landing| moved(landing.shell));
         for (landing, found) in changed.zip(&part.landings) {
-            *landing = Landing { shell: own[found.shell as usize], ..*found };
+            *landing = Landing { shell: shells[found.shell as usize], ..*found };
         }
     }
 
@@ -237,11 +237,11 @@ impl Shells {
     /// Distances of the flat triangles.
     fn flat(&self, target: &Target) -> Hausdorff {
         let locator = locator(&self.mesh);
-        let own = samples(&self.mesh, target.diagonal / 200.0);
+        let points = samples(&self.mesh, target.diagonal / 200.0);
         let there = |s: &Sample| (target.reference.closest(&s.point).0 - s.point).norm();
-        let there: Vec<f64> = own.par_iter().map(there).collect();
+        let there: Vec<f64> = points.par_iter().map(there).collect();
         let back = target.fine.samples.par_iter().map(|s| distance(&locator, &s.point)).collect::<Vec<_>>();
-        Hausdorff::of(spread(&own, &there), spread(&target.fine.samples, &back))
+        Hausdorff::of(spread(&points, &there), spread(&target.fine.samples, &back))
     }
 
     /// The curved surface in small triangles with its distances.
@@ -257,8 +257,8 @@ impl Shells {
             };
             places.iter().map(place).collect::<Vec<_>>()
         };
-        let all: Vec<(Sample, f64)> = triangles.par_iter().flat_map_iter(of).collect();
-        let (samples, off): (Vec<Sample>, Vec<f64>) = all.into_iter().unzip();
+        let measured: Vec<(Sample, f64)> = triangles.par_iter().flat_map_iter(of).collect();
+        let (samples, off): (Vec<Sample>, Vec<f64>) = measured.into_iter().unzip();
         let mut error_map = Mesh { points: samples.iter().map(|s| s.point).collect(), ..Mesh::default() };
         let corners = (0..triangles.len()).flat_map(|t| {
             let places = places.len();

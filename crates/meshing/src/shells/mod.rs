@@ -574,20 +574,20 @@ impl Shells {
 
     /// Some of the shells, numbered anew, and the numbers of their points, increasing.
     fn part(&self, shells: &[u32]) -> (Self, Vec<u32>) {
-        let own = shells.iter().map(|&t| self.mesh.triangles[t as usize]);
-        let mut nodes: Vec<u32> = own.clone().flatten().collect();
+        let corners = shells.iter().map(|&t| self.mesh.triangles[t as usize]);
+        let mut nodes: Vec<u32> = corners.clone().flatten().collect();
         nodes.sort_unstable();
         nodes.dedup();
         let mut number = vec![0; self.mesh.points.len()];
         (0..).zip(&nodes).for_each(|(at, &node)| number[node as usize] = at);
-        let triangles = own.map(|nodes| nodes.map(|n| number[n as usize])).collect();
+        let triangles = corners.map(|nodes| nodes.map(|n| number[n as usize])).collect();
         let points = nodes.iter().map(|&n| self.mesh.points[n as usize]).collect();
-        let some = |all: &[bool]| nodes.iter().map(|&n| all[n as usize]).collect();
+        let some = |flags: &[bool]| nodes.iter().map(|&n| flags[n as usize]).collect();
         let own_flat =
             if self.flat.is_empty() { Vec::new() } else { shells.iter().map(|&t| self.is_flat(t)).collect() };
         let mut mesh = TriangleMesh::new(points, triangles);
-        let own = |node: u32| nodes.binary_search(&node).ok().map(|at| at as u32);
-        mesh.set_creases(self.mesh.creases().filter_map(|[a, b]| Some([own(a)?, own(b)?])));
+        let renumbered = |node: u32| nodes.binary_search(&node).ok().map(|at| at as u32);
+        mesh.set_creases(self.mesh.creases().filter_map(|[a, b]| Some([renumbered(a)?, renumbered(b)?])));
         let part = Self {
             mesh,
             normals: nodes.iter().map(|&n| self.normals[n as usize]).collect(),

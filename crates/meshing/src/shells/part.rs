@@ -10,7 +10,7 @@ pub(super) struct Part {
     pub(super) shells: Shells,
     pub(super) distances: Distances,
     /// The numbers of its shells in the whole, increasing.
-    own: Vec<u32>,
+    shell_numbers: Vec<u32>,
     /// The numbers of its points in the whole, increasing.
     pub(super) nodes: Vec<u32>,
 }
@@ -24,10 +24,10 @@ impl Part {
         let near = whole.near(|shell| whole.moves(shell));
         near.iter().flat_map(|&t| whole.mesh.triangles[t as usize]).for_each(|n| inner[n as usize] = true);
         let has_inner = |t: &u32| whole.mesh.triangles[*t as usize].iter().any(|&n| inner[n as usize]);
-        let own: Vec<u32> = whole.mesh.alive().filter(has_inner).collect();
-        let (shells, nodes) = whole.part(&own);
-        let distances = distances.part(&own, |t| whole.moves(t));
-        (!own.is_empty()).then_some(Self { shells, distances, own, nodes })
+        let shell_numbers: Vec<u32> = whole.mesh.alive().filter(has_inner).collect();
+        let (shells, nodes) = whole.part(&shell_numbers);
+        let distances = distances.part(&shell_numbers, |t| whole.moves(t));
+        (!shell_numbers.is_empty()).then_some(Self { shells, distances, shell_numbers, nodes })
     }
 
     /// The number in the part of a point of the whole.
@@ -37,21 +37,21 @@ impl Part {
 
     /// The number in the part of a shell of the whole.
     pub(super) fn shell(&self, shell: u32) -> Option<u32> {
-        Some(self.own.binary_search(&shell).ok()? as u32)
+        Some(self.shell_numbers.binary_search(&shell).ok()? as u32)
     }
 
     /// Puts the changed part in its place in the whole, which has not changed since the part was cut out.
     pub(super) fn put_back(self, whole: &mut Shells, distances: &mut Distances) {
-        let Self { shells, distances: found, mut own, mut nodes } = self;
+        let Self { shells, distances: found, mut shell_numbers, mut nodes } = self;
         let moved: Vec<bool> = (0..whole.mesh.triangles.len() as u32).map(|t| whole.moves(t)).collect();
         let fresh = |old: usize, new: usize, first: usize| (first as u32..).take(new - old);
-        own.extend(fresh(own.len(), shells.mesh.triangles.len(), moved.len()));
+        shell_numbers.extend(fresh(shell_numbers.len(), shells.mesh.triangles.len(), moved.len()));
         nodes.extend(fresh(nodes.len(), shells.mesh.points.len(), whole.mesh.points.len()));
-        whole.mesh.put(&shells.mesh, &own, &nodes);
+        whole.mesh.put(&shells.mesh, &shell_numbers, &nodes);
         let count = whole.mesh.points.len();
         whole.normals.resize(count, Default::default());
-        for all in [&mut whole.on_border, &mut whole.active, &mut whole.creased, &mut whole.sharp] {
-            all.resize(count, false);
+        for flags in [&mut whole.on_border, &mut whole.active, &mut whole.creased, &mut whole.sharp] {
+            flags.resize(count, false);
         }
         for (at, &node) in nodes.iter().enumerate() {
             let node = node as usize;
@@ -61,6 +61,6 @@ impl Part {
             whole.creased[node] = shells.creased[at];
             whole.sharp[node] = shells.sharp[at];
         }
-        distances.put(&found, &own, |t| moved[t as usize]);
+        distances.put(&found, &shell_numbers, |t| moved[t as usize]);
     }
 }

@@ -149,10 +149,10 @@ impl Shells {
         let facing = self.mesh.point_normal(point);
         let project = |x: Vector3| self.projected(point, &x, &facing, target);
         let aim = project(aim);
-        let own = self.worth_round(point, &here);
+        let worth_here = self.worth_round(point, &here);
         let upright = self.upright_round(point, &here);
         let mut aims = vec![project(here + 0.4 * (aim - here)), aim];
-        if own < GOOD_SHAPE {
+        if worth_here < GOOD_SHAPE {
             let size = 0.15 * self.reach(point);
             let [first, second, _] = frame(&self.normals[point as usize]);
             let way = |k: usize| (k as f64 * std::f64::consts::FRAC_PI_4).sin_cos();
@@ -164,7 +164,7 @@ impl Shells {
             .map(|aim| (self.worth_round(point, &aim).min(GOOD_SHAPE), aim))
             .max_by(|a, b| a.0.total_cmp(&b.0).then(std::cmp::Ordering::Greater));
         if let Some((worth, aim)) = best
-            && worth >= own.min(GOOD_SHAPE)
+            && worth >= worth_here.min(GOOD_SHAPE)
         {
             let normal = self.normals[point as usize];
             self.mesh.points[point as usize] = aim;

@@ -150,15 +150,15 @@ impl Shells {
         effort: &mut Effort,
     ) -> bool {
         let Some(part) = Part::new(self, knot, distances) else { return false };
-        let own: Vec<u32> = knot.iter().filter_map(|&node| part.point(node)).collect();
-        let Some(found) = part.best_step(&own, target, parts, effort) else { return false };
+        let points: Vec<u32> = knot.iter().filter_map(|&node| part.point(node)).collect();
+        let Some(found) = part.best_step(&points, target, parts, effort) else { return false };
         // Normals of neighbours turn, too.
         self.activate(knot.to_vec());
-        for (own, &node) in part.nodes.iter().enumerate().filter(|(_, node)| self.active[**node as usize]) {
+        for (at, &node) in part.nodes.iter().enumerate().filter(|(_, node)| self.active[**node as usize]) {
             let node = node as usize;
-            self.mesh.points[node] = found.mesh.points[own];
-            self.normals[node] = found.normals[own];
-            self.creased[node] = found.creased[own];
+            self.mesh.points[node] = found.mesh.points[at];
+            self.normals[node] = found.normals[at];
+            self.creased[node] = found.creased[at];
         }
         *distances = self.distances_after(distances, target, &mut Effort::new(usize::MAX));
         true
@@ -206,14 +206,14 @@ impl Shells {
 fn knots(shells: &Shells, pairs: &[[u32; 2]]) -> Vec<Vec<u32>> {
     let mut knots: Vec<Vec<u32>> = Vec::new();
     for pair in pairs {
-        let mut own: Vec<u32> = pair.iter().flat_map(|&t| shells.mesh.triangles[t as usize]).collect();
+        let mut nodes: Vec<u32> = pair.iter().flat_map(|&t| shells.mesh.triangles[t as usize]).collect();
         let (joined, apart): (Vec<_>, Vec<_>) =
-            knots.into_iter().partition(|knot| knot.iter().any(|node| own.contains(node)));
-        own.extend(joined.into_iter().flatten());
-        own.sort_unstable();
-        own.dedup();
+            knots.into_iter().partition(|knot| knot.iter().any(|node| nodes.contains(node)));
+        nodes.extend(joined.into_iter().flatten());
+        nodes.sort_unstable();
+        nodes.dedup();
         knots = apart;
-        knots.push(own);
+        knots.push(nodes);
     }
     knots
 }

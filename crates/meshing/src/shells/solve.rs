@@ -33,10 +33,13 @@ impl ShellBlock {
         let mut block = Self { nodes, matrix: [[0.0; ALL]; ALL], right: [0.0; ALL] };
         for row in rows {
             let weight = (row.off / scale).clamp(0.2, 3.0).powi(POWER - 2);
-            for (i, own) in row.slope.iter().enumerate().filter(|(_, own)| **own != 0.0) {
-                let own = weight * own;
-                block.matrix[i][..=i].iter_mut().zip(&row.slope).for_each(|(m, slope)| *m += own * slope);
-                block.right[i] -= own * row.off;
+            for (i, slope) in row.slope.iter().enumerate().filter(|(_, slope)| **slope != 0.0) {
+                let weighted = weight * slope;
+                block.matrix[i][..=i]
+                    .iter_mut()
+                    .zip(&row.slope)
+                    .for_each(|(m, slope)| *m += weighted * slope);
+                block.right[i] -= weighted * row.off;
             }
         }
         for i in 0..ALL {
@@ -60,13 +63,13 @@ impl ShellBlock {
 
     /// Adds its product with a vector.
     fn apply(&self, x: &[f64], sum: &mut [f64]) {
-        let mut own = [0.0; ALL];
-        for (own, first) in own.chunks_exact_mut(UNKNOWNS).zip(self.places()) {
-            own.copy_from_slice(&x[first..first + UNKNOWNS]);
+        let mut values = [0.0; ALL];
+        for (part, first) in values.chunks_exact_mut(UNKNOWNS).zip(self.places()) {
+            part.copy_from_slice(&x[first..first + UNKNOWNS]);
         }
         let mut product = [0.0; ALL];
         for (product, row) in product.iter_mut().zip(&self.matrix) {
-            *product = row.iter().zip(&own).map(|(m, x)| m * x).sum();
+            *product = row.iter().zip(&values).map(|(m, x)| m * x).sum();
         }
         self.add(&product, sum);
     }

@@ -50,11 +50,11 @@ fn surface(field: &dyn ImplicitField, edge: f64) -> TriangleMesh {
 /// checked for crossings from `uncrossed` triangles down.
 fn found(mesh: &TriangleMesh, goal: ShellGoal, most: usize, uncrossed: usize) -> (FittedShells, usize) {
     let rounds = std::cell::Cell::new(0);
-    let told = |progress: FitProgress| {
+    let on_progress = |progress: FitProgress| {
         assert!((0.0..=1.0).contains(&progress.part), "{progress:?}");
         rounds.set(rounds.get() + 1);
     };
-    (FittedShells::within(mesh, goal, Effort::new(most), uncrossed, &told), rounds.get())
+    (FittedShells::within(mesh, goal, Effort::new(most), uncrossed, &on_progress), rounds.get())
 }
 
 /// A ball with a cavity, whose wall of 0.05 is thinner than the error of few flat triangles. Decimated
@@ -130,8 +130,8 @@ fn a_fit_that_cannot_reach_its_goal_ends_with_the_best_so_far() {
         let off = report.distances.largest() / report.diagonal;
         assert!(report.stopped && !report.reached && off > 1e-5);
         let [x, y, z] = report.farthest.map(|x| 1e3 * x);
-        let told = format!("not reached: 0.001 % requested, at best {:.3} % reached (", 100.0 * off);
-        assert!(report.warnings()[0].starts_with(&told), "{report}");
+        let beginning = format!("not reached: 0.001 % requested, at best {:.3} % reached (", 100.0 * off);
+        assert!(report.warnings()[0].starts_with(&beginning), "{report}");
         assert!(
             report.warnings()[0]
                 .contains(&format!("({x:.1}, {y:.1}, {z:.1}) mm. The fit ended at its limit of work"))

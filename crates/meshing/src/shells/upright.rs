@@ -129,10 +129,10 @@ impl Shells {
         let mut fan = vec![triangle];
         let mut at = 0;
         while at < fan.len() {
-            let own = fan[at];
+            let triangle = fan[at];
             let joined = |t: &u32| {
-                others(own).any(|n| self.mesh.triangles[*t as usize].contains(&n))
-                    && self.mesh.normal(own).dot(&self.mesh.normal(*t)) > SMOOTH
+                others(triangle).any(|n| self.mesh.triangles[*t as usize].contains(&n))
+                    && self.mesh.normal(triangle).dot(&self.mesh.normal(*t)) > SMOOTH
             };
             let more: Vec<u32> = star.clone().filter(|t| !fan.contains(t) && joined(t)).collect();
             fan.extend(more);

@@ -52,7 +52,7 @@ impl Boxes {
             let count: f64 = (0..3).map(|axis| (last[axis] - first[axis] + 1) as f64).product();
             if count > cubes.len() as f64 {
                 let within = |cube: &[i64; 3]| (0..3).all(|k| (first[k]..=last[k]).contains(&cube[k]));
-                found.extend(cubes.iter().filter(|(cube, _)| within(cube)).flat_map(|(_, own)| own));
+                found.extend(cubes.iter().filter(|(cube, _)| within(cube)).flat_map(|(_, numbers)| numbers));
                 continue;
             }
             for i in first[0]..=last[0] {
@@ -83,21 +83,21 @@ mod tests {
             let half = Vector3::repeat(0.5 * 10_f64.powi(-((k % 5) as i32))).component_mul(&place(k + 7));
             [place(k) - half.abs(), place(k) + half.abs()]
         };
-        let mut all: Vec<[Vector3; 2]> = (0..500).map(boxed).collect();
-        all.push([place(3); 2]);
+        let mut extents: Vec<[Vector3; 2]> = (0..500).map(boxed).collect();
+        extents.push([place(3); 2]);
         let mut boxes = Boxes::new(1e-3);
-        (0..).zip(&all).for_each(|(number, &own)| boxes.insert(number, own));
-        assert_eq!(boxes.len(), all.len());
+        (0..).zip(&extents).for_each(|(number, &extent)| boxes.insert(number, extent));
+        assert_eq!(boxes.len(), extents.len());
         let mut met = 0;
-        for own in &all {
-            let near = boxes.near(*own);
-            for (number, other) in (0_u32..).zip(&all) {
-                if (0..3).all(|k| own[0][k] <= other[1][k] && other[0][k] <= own[1][k]) {
+        for extent in &extents {
+            let near = boxes.near(*extent);
+            for (number, other) in (0_u32..).zip(&extents) {
+                if (0..3).all(|k| extent[0][k] <= other[1][k] && other[0][k] <= extent[1][k]) {
                     assert!(near.contains(&number));
                     met += 1;
                 }
             }
         }
-        assert!(met > 2 * all.len() && met < all.len() * all.len() / 2, "{met}");
+        assert!(met > 2 * extents.len() && met < extents.len() * extents.len() / 2, "{met}");
     }
 }

@@ -51,29 +51,29 @@ pub(crate) fn crossing_groups(
         };
         group(number).iter().filter(reaches)
     };
-    let meeting = |own: u32, other: u32| {
-        let [a, b] = [own, other].map(|number| boxes[number as usize]);
+    let meeting = |first: u32, other: u32| {
+        let [a, b] = [first, other].map(|number| boxes[number as usize]);
         let both = [a[0].sup(&b[0]), a[1].inf(&b[1])];
-        within(own, both).find_map(|&s| {
+        within(first, both).find_map(|&s| {
             let near = s.iter().map(|&n| &points[n as usize]).fold([points[s[0] as usize]; 2], widened);
             within(other, [near[0].sup(&both[0]), near[1].inf(&both[1])]).find_map(|&t| meet(&place_of, s, t))
         })
     };
-    let of = |own: u32| {
-        let [low, high] = boxes[own as usize];
+    let of = |first: u32| {
+        let [low, high] = boxes[first as usize];
         let near = tree.locate_in_envelope_intersecting(AABB::from_corners(low.into(), high.into()));
-        let looked = is_looked_at(own);
+        let looked = is_looked_at(first);
         let others = near.map(|other| other.number).filter(|&other| {
-            (other > own || each > 1 && other == own)
+            (other > first || each > 1 && other == first)
                 && (looked || is_looked_at(other))
-                && meeting(own, other).is_some()
+                && meeting(first, other).is_some()
         });
         let mut others: Vec<u32> = others.collect();
         others.sort_unstable();
-        others.into_iter().map(move |other| [own, other])
+        others.into_iter().map(move |other| [first, other])
     };
     let pairs: Vec<[u32; 2]> = (0..boxes.len() as u32).into_par_iter().flat_map_iter(of).collect();
-    let place = pairs.first().and_then(|&[own, other]| meeting(own, other));
+    let place = pairs.first().and_then(|&[first, other]| meeting(first, other));
     (pairs, place)
 }
 
@@ -87,7 +87,7 @@ impl TriangleMesh {
     pub(crate) fn bounds(&self, triangles: &[[u32; 3]]) -> Option<[Vector3; 2]> {
         let start = self.points[*triangles.as_flattened().first()? as usize];
         let corners = triangles.as_flattened().iter().map(|&n| self.points[n as usize]);
-        Some(corners.fold([start; 2], |own, x| widened(own, &x)))
+        Some(corners.fold([start; 2], |extent, x| widened(extent, &x)))
     }
 
     /// True if new triangles would intersect each other or existing ones, except some that would be removed.
@@ -111,7 +111,7 @@ impl TriangleMesh {
         };
         let cross = |s: [u32; 3], t: [u32; 3]| meet(&|n| self.points[n as usize], s, t).is_some();
         let mut others = existing.filter(near).map(|t| self.triangles[t as usize]);
-        others.any(|other| new.iter().any(|&own| cross(own, other)))
+        others.any(|other| new.iter().any(|&triangle| cross(triangle, other)))
             || new.iter().enumerate().any(|(k, &s)| new[..k].iter().any(|&t| cross(s, t)))
     }
 }
@@ -121,10 +121,10 @@ pub(crate) fn meet(at: &(impl Fn(u32) -> Vector3 + ?Sized), s: [u32; 3], t: [u32
     if s.iter().filter(|n| t.contains(n)).count() > 1 {
         return None;
     }
-    let reaching = |&(own, other): &([u32; 3], [u32; 3])| !is_beside(at, other, own);
-    [(s, t), (t, s)].into_iter().filter(reaching).find_map(|(own, other)| {
+    let reaching = |&(piercing, other): &([u32; 3], [u32; 3])| !is_beside(at, other, piercing);
+    [(s, t), (t, s)].into_iter().filter(reaching).find_map(|(piercing, other)| {
         (0..3).find_map(|k| {
-            let edge = [own[k], own[(k + 1) % 3]];
+            let edge = [piercing[k], piercing[(k + 1) % 3]];
             if edge.iter().any(|n| other.contains(n)) {
                 return None;
             }

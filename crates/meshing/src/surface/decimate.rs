@@ -237,7 +237,10 @@ impl<'m> Decimation<'m> {
             self.mesh.collapse(keep, gone, position);
             self.place_round(keep, count);
             let moved = self.quadrics[gone as usize];
-            self.quadrics[keep as usize].iter_mut().zip(&moved).for_each(|(own, other)| own.add(other));
+            self.quadrics[keep as usize]
+                .iter_mut()
+                .zip(&moved)
+                .for_each(|(quadric, other)| quadric.add(other));
             self.changes[keep as usize] += 1;
             self.changes[gone as usize] += 1;
             for other in self.mesh.neighbours(keep) {
@@ -286,9 +289,9 @@ impl<'m> Decimation<'m> {
         let stay = before.iter().filter(|nodes| !(nodes.contains(&keep) && nodes.contains(&gone)));
         let after: Vec<[u32; 3]> =
             stay.map(|nodes| nodes.map(|n| if n == gone { keep } else { n })).collect();
-        let cross = |mesh: &TriangleMesh, own: &[[u32; 3]]| {
-            let near = mesh.bounds(own).map(|bounds| placed.near(bounds)).unwrap_or_default();
-            mesh.would_cross_among(own, &old, near.into_iter().filter(|&t| mesh.exists(t)))
+        let cross = |mesh: &TriangleMesh, triangles: &[[u32; 3]]| {
+            let near = mesh.bounds(triangles).map(|bounds| placed.near(bounds)).unwrap_or_default();
+            mesh.would_cross_among(triangles, &old, near.into_iter().filter(|&t| mesh.exists(t)))
         };
         let here = std::mem::replace(&mut self.mesh.points[keep as usize], position);
         let crosses = cross(self.mesh, &after);

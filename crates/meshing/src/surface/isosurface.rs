@@ -121,13 +121,13 @@ impl SampleGrid {
         let mut found = Vec::new();
         for first in (0..ny - 1).flat_map(|j| (0..nx - 1).map(move |i| i + nx * (j + ny * k))) {
             let inside = |at: usize| values[at] > 0.0;
-            let own = inside(first);
-            let all = (1..8).all(|c| {
+            let first_inside = inside(first);
+            let uniform = (1..8).all(|c| {
                 inside(
                     first + (0..3).filter(|axis| c >> axis & 1 == 1).map(|axis| strides[axis]).sum::<usize>(),
-                ) == own
+                ) == first_inside
             });
-            if all {
+            if uniform {
                 continue;
             }
             for (number, way) in WAYS.into_iter().enumerate() {
@@ -208,8 +208,8 @@ mod tests {
         for step in [0.013, 0.02] {
             let liver = crate::Phantom::new(crate::Organ::Brain, 1.0).unwrap();
             let mesh = TriangleMesh::of_field(&liver, step, 1_000_000).unwrap();
-            let own = crate::report::soundness::euler_number(&mesh.compact().1);
-            assert_eq!(euler_number_of_field(&liver, step).unwrap(), own);
+            let expected = crate::report::soundness::euler_number(&mesh.compact().1);
+            assert_eq!(euler_number_of_field(&liver, step).unwrap(), expected);
         }
     }
 

@@ -30,9 +30,9 @@ pub(crate) fn shells(points: &[Vector3], triangles: &[[u32; 3]]) -> Vec<Shell> {
     for number in 0..triangles.len() as u32 {
         pieces.entry(find(&mut root, number)).or_default().push(number);
     }
-    let shell = |own: Vec<u32>| {
-        let nodes: Vec<[u32; 3]> = own.iter().map(|&t| triangles[t as usize]).collect();
-        Shell { volume: signed_volume(points, &nodes), triangles: own }
+    let shell = |numbers: Vec<u32>| {
+        let nodes: Vec<[u32; 3]> = numbers.iter().map(|&t| triangles[t as usize]).collect();
+        Shell { volume: signed_volume(points, &nodes), triangles: numbers }
     };
     pieces.into_values().map(shell).collect()
 }

@@ -116,9 +116,9 @@ impl TriangleMesh {
             }
             let lines = [a, b].map(|n| self.marked(n).len());
             for [keep, gone] in [[a, b], [b, a]] {
-                let [own, other] = if keep == a { lines } else { [lines[1], lines[0]] };
+                let [kept, other] = if keep == a { lines } else { [lines[1], lines[0]] };
                 let ends = [keep, gone].map(|n| self.points[n as usize]);
-                let position = if own == other && own == 0 { (ends[0] + ends[1]) / 2.0 } else { ends[0] };
+                let position = if kept == other && kept == 0 { (ends[0] + ends[1]) / 2.0 } else { ends[0] };
                 let short = |n: &u32| (self.points[*n as usize] - position).norm() <= longest;
                 if self.may_collapse(keep, gone)
                     && self.neighbours(gone).iter().all(short)
@@ -200,8 +200,8 @@ impl TriangleMesh {
                     let [a, b, c] = self.corners(t);
                     (self.area(t), (a + b + c) / 3.0)
                 });
-                let (area, sum) = parts.fold((0.0, Vector3::zeros()), |(area, sum), (own, centre)| {
-                    (area + own, sum + own * centre)
+                let (area, sum) = parts.fold((0.0, Vector3::zeros()), |(area, sum), (part, centre)| {
+                    (area + part, sum + part * centre)
                 });
                 let normal = self.point_normal(point);
                 let way = sum / area - here;

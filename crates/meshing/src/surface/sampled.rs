@@ -191,11 +191,11 @@ mod tests {
         let half = Vector3::from(size) / 2.0;
         for (spacing, offset) in [(0.001, 0.0), (0.0007, 0.002), (0.001, -0.003)] {
             let sampled = enclosed(&mesh).sampled(spacing, offset, &|_| ()).unwrap();
-            let (mut exact, mut all) = (0, 0);
+            let (mut exact, mut total) = (0, 0);
             for (place, value) in points(&sampled) {
                 let expected = to_box(&(place - half), &half) - offset;
                 let off = (value - expected).abs();
-                all += 1;
+                total += 1;
                 if expected.abs() < BAND * spacing {
                     exact += 1;
                     assert!(off < 1e-8, "{value} instead of {expected} at {place}");
@@ -203,7 +203,9 @@ mod tests {
                 assert!(off < COARSE as f64 * spacing, "{value} instead of {expected} at {place}");
                 assert!(expected.abs() < 1e-8 || value * expected > 0.0, "{value}, {expected} at {place}");
             }
-            println!("spacing {spacing} m, offset {offset} m: {exact} of {all} points are near the surface");
+            println!(
+                "spacing {spacing} m, offset {offset} m: {exact} of {total} points are near the surface"
+            );
             assert!((sampled.thickness - (0.02 + 2.0 * offset)).abs() < 1e-9);
             let drawn = sampled.surface.to_mesh();
             let far = drawn.points.iter().map(|x| (to_box(&(x - half), &half) - offset).abs());

@@ -54,12 +54,12 @@ impl LabelVolume {
 impl SurfaceVolume {
     /// Lines of a report.
     pub fn lines(&self) -> Vec<String> {
-        let of_label = |own: &LabelVolume| {
+        let of_label = |entry: &LabelVolume| {
             format!(
                 "label {:<10} {:.3} ml ({:+.2} % of the input)",
-                own.label,
-                own.volume * 1e6,
-                own.error() * 100.0
+                entry.label,
+                entry.volume * 1e6,
+                entry.error() * 100.0
             )
         };
         let lost = LostReport::in_words(&self.lost).map(|lost| format!("lost             {lost}"));
@@ -68,16 +68,16 @@ impl SurfaceVolume {
 
     /// Deviations from the input that matter.
     pub fn warnings(&self) -> Vec<String> {
-        let off = self.labels.iter().filter(|own| own.error().abs() > LARGEST_VOLUME_ERROR);
-        let off = off.map(|own| {
+        let off = self.labels.iter().filter(|entry| entry.error().abs() > LARGEST_VOLUME_ERROR);
+        let off = off.map(|entry| {
             format!(
                 "the surface encloses {:.1} % {} of label {} than the input ({:.3} ml instead of {:.3} ml); \
                  use smaller triangles",
-                100.0 * own.error().abs(),
-                if own.error() < 0.0 { "less" } else { "more" },
-                own.label,
-                own.volume * 1e6,
-                own.input_volume * 1e6
+                100.0 * entry.error().abs(),
+                if entry.error() < 0.0 { "less" } else { "more" },
+                entry.label,
+                entry.volume * 1e6,
+                entry.input_volume * 1e6
             )
         });
         off.chain(self.lost_parts().filter(|_| self.lacks_much())).collect()
@@ -93,7 +93,7 @@ impl SurfaceVolume {
     }
 
     fn lacks_much(&self) -> bool {
-        let input: f64 = self.labels.iter().map(|own| own.input_volume).sum();
+        let input: f64 = self.labels.iter().map(|entry| entry.input_volume).sum();
         let lost: f64 = self.lost.iter().map(|part| part.volume).sum();
         lost > LARGEST_VOLUME_ERROR * input
     }
@@ -118,14 +118,14 @@ impl TriangleMesh {
         let wanted = input.iter().sum::<f64>() - lost.iter().map(LostPart::volume).sum::<f64>();
         let moved = self.inflate(wanted, MOST * edge);
         let inside = covered(self);
-        let own = match input.len() {
+        let volumes = match input.len() {
             1 => vec![self.volume()],
             _ => samples.volumes_with_neighbours(&inside),
         };
         let labels = anatomy.labels();
         let labels = labels
             .iter()
-            .zip(own)
+            .zip(volumes)
             .zip(&input)
             .map(|((&label, volume), &input_volume)| LabelVolume { label, volume, input_volume });
         Some(SurfaceVolume {

@@ -61,12 +61,12 @@ impl fmt::Display for SurfaceRepairs {
             (self.cut_edges, ["edge", "edges"], "of more than two faces split"),
             (self.turned_faces, ["face", "faces"], "turned"),
         ];
-        let told: Vec<String> = parts
+        let notes: Vec<String> = parts
             .iter()
             .filter(|(n, ..)| *n > 0)
             .map(|(n, [one, more], done)| format!("{} {done}", counted(*n, one, more)))
             .collect();
-        f.write_str(&if told.is_empty() { "nothing".into() } else { told.join(", ") })
+        f.write_str(&if notes.is_empty() { "nothing".into() } else { notes.join(", ") })
     }
 }
 
@@ -113,11 +113,11 @@ impl TriangleMesh {
             return Err(MeshingError::NotFinite { what: "a point of the surface", value });
         }
         let mut repairs = SurfaceRepairs::default();
-        let (own, points) = joined(&surface.nodes(), points, &mut repairs);
+        let (numbers, points) = joined(&surface.nodes(), points, &mut repairs);
         let mut triangles: Vec<[u32; 3]> = Vec::with_capacity(surface.faces.len());
         let mut seen = BTreeSet::new();
         for face in &surface.faces {
-            let nodes: Vec<u32> = face.nodes().iter().map(|node| own[node]).collect();
+            let nodes: Vec<u32> = face.nodes().iter().map(|node| numbers[node]).collect();
             for k in 2..nodes.len() {
                 let triangle = [nodes[0], nodes[k - 1], nodes[k]];
                 let mut sorted = triangle;
@@ -216,20 +216,20 @@ impl TriangleMesh {
         let (points, triangles) = self.compact();
         let mut compacted = Self::new(points, triangles);
         let used = self.star.iter().scan(0, |count, star| {
-            let own = *count;
+            let number = *count;
             *count += u32::from(!star.is_empty());
-            Some(own)
+            Some(number)
         });
         let number: Vec<u32> = used.collect();
         compacted.set_creases(self.creases().map(|edge| edge.map(|node| number[node as usize])));
         compacted
     }
 
-    /// Puts in the triangles of a changed part of this surface: they replace others and add new ones. `own`
-    /// and `nodes` are the numbers of its triangles and points here. Creases between its points are taken
-    /// from the part.
-    pub(crate) fn put(&mut self, part: &Self, own: &[u32], nodes: &[u32]) {
-        for &t in own.iter().filter(|&&t| (t as usize) < self.triangles.len()) {
+    /// Puts in the triangles of a changed part of this surface: they replace others and add new ones.
+    /// `triangles` and `nodes` are the numbers of its triangles and points here. Creases between its points
+    /// are taken from the part.
+    pub(crate) fn put(&mut self, part: &Self, triangles: &[u32], nodes: &[u32]) {
+        for &t in triangles.iter().filter(|&&t| (t as usize) < self.triangles.len()) {
             let [a, b, c] = self.triangles[t as usize];
             for (edge, node) in [([a, b], a), ([b, c], b), ([c, a], c)] {
                 self.creases.remove(&key(edge[0], edge[1]));
@@ -238,13 +238,13 @@ impl TriangleMesh {
         }
         let count =
             |numbers: &[u32], old: usize| numbers.iter().map(|&n| n as usize + 1).fold(old, usize::max);
-        self.triangles.resize(count(own, self.triangles.len()), GONE);
+        self.triangles.resize(count(triangles, self.triangles.len()), GONE);
         self.points.resize(count(nodes, self.points.len()), Vector3::zeros());
         self.star.resize(self.points.len(), Vec::new());
         for (x, &node) in part.points.iter().zip(nodes) {
             self.points[node as usize] = *x;
         }
-        for (at, &t) in own.iter().enumerate() {
+        for (at, &t) in triangles.iter().enumerate() {
             let exists = part.exists(at as u32);
             let place = |n: u32| nodes[n as usize];
             self.triangles[t as usize] = if exists { part.triangles[at].map(place) } else { GONE };
@@ -378,14 +378,14 @@ impl TriangleMesh {
     /// True if all triangles round two points that stay keep their side and some shape if the points become
     /// one at `position`.
     pub(crate) fn keeps_sides(&self, keep: u32, gone: u32, position: &Vector3, least_shape: f64) -> bool {
-        [(keep, gone), (gone, keep)].into_iter().all(|(own, other)| {
-            self.star[own as usize].iter().all(|&t| {
+        [(keep, gone), (gone, keep)].into_iter().all(|(moved, other)| {
+            self.star[moved as usize].iter().all(|&t| {
                 let nodes = self.triangles[t as usize];
                 if nodes.contains(&other) {
                     return true;
                 }
                 let before = self.corners(t);
-                let after = [0, 1, 2].map(|k| if nodes[k] == own { *position } else { before[k] });
+                let after = [0, 1, 2].map(|k| if nodes[k] == moved { *position } else { before[k] });
                 let (old, new) = (cross(before), cross(after));
                 // A triangle that is a line or a point has no side and no shape to keep.
                 let turned = shape(before) > LEAST_SIDED && old.dot(&new) <= 0.5 * old.norm() * new.norm();
@@ -489,17 +489,17 @@ fn joined(
     let (low, high) = nodes.iter().map(of).fold((start, start), |(l, h), x| (l.inf(&x), h.sup(&x)));
     let size = (SAME * (high - low).norm()).max(f64::MIN_POSITIVE);
     let mut places: BTreeMap<[i64; 3], u32> = BTreeMap::new();
-    let (mut own, mut kept) = (BTreeMap::new(), Vec::new());
+    let (mut numbers, mut kept) = (BTreeMap::new(), Vec::new());
     for &node in nodes {
         let place = (points[node as usize] - low) / size;
         let number = *places.entry([0, 1, 2].map(|i| place[i].round() as i64)).or_insert_with(|| {
             kept.push(points[node as usize]);
             kept.len() as u32 - 1
         });
-        own.insert(node, number);
+        numbers.insert(node, number);
     }
     repairs.joined_points = nodes.len() - kept.len();
-    (own, kept)
+    (numbers, kept)
 }
 
 /// The sides of each edge: triangle and whether it runs from the smaller end to the larger.
@@ -524,8 +524,8 @@ fn turn_alike(triangles: &mut [[u32; 3]], points: &[Vector3]) -> usize {
     };
     let shells: Vec<Shell> = pieces.iter().zip(&closed).filter(|(_, c)| **c).map(|(p, _)| shell(p)).collect();
     let containers = containers(points, triangles, &shells);
-    for (own, shell) in shells.iter().enumerate() {
-        let around = containers[own].iter().chain([&own]);
+    for (number, shell) in shells.iter().enumerate() {
+        let around = containers[number].iter().chain([&number]);
         let outermost = around.max_by(|&&a, &&b| shells[a].volume.abs().total_cmp(&shells[b].volume.abs()));
         if outermost.is_some_and(|&at| shells[at].volume < 0.0) {
             shell.triangles.iter().for_each(|&t| triangles[t as usize].swap(1, 2));
@@ -550,16 +550,16 @@ fn turn_pieces(triangles: &mut [[u32; 3]]) -> (Vec<Vec<u32>>, Vec<bool>) {
         // Edges of one triangle or of more than two: how often they run one way more than the other.
         let mut open: BTreeMap<[u32; 2], i32> = BTreeMap::new();
         while let Some(at) = next.pop_front() {
-            let own = turn[at as usize] == Some(true);
+            let turned = turn[at as usize] == Some(true);
             let [a, b, c] = triangles[at as usize];
             for (from, to) in [(a, b), (b, c), (c, a)] {
                 let [(s, forward), (t, other)] = sides[&key(from, to)][..] else {
-                    *open.entry(key(from, to)).or_default() += if (from < to) != own { 1 } else { -1 };
+                    *open.entry(key(from, to)).or_default() += if (from < to) != turned { 1 } else { -1 };
                     continue;
                 };
                 let across = if s == at { t } else { s };
                 if turn[across as usize].is_none() {
-                    turn[across as usize] = Some(own ^ (forward == other));
+                    turn[across as usize] = Some(turned ^ (forward == other));
                     piece.push(across);
                     next.push_back(across);
                 }
@@ -634,8 +634,8 @@ fn cut(
     }
     let before = triangles.clone();
     let mut across: BTreeMap<(u32, [u32; 2]), u32> = BTreeMap::new();
-    for (&edge, own) in &sides {
-        for [s, t] in joined_at(edge, own, &before, &points) {
+    for (&edge, around) in &sides {
+        for [s, t] in joined_at(edge, around, &before, &points) {
             across.insert((s, edge), t);
             across.insert((t, edge), s);
         }

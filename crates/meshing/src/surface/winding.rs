@@ -71,7 +71,7 @@ fn divide(triangles: &mut [[Vector3; 3]], offset: usize, nodes: &mut Vec<Node>) 
     let sum: Vector3 = triangles.iter().map(|t| area(t).norm() * centre(t)).sum();
     let middle = if weight > 0.0 { sum / weight } else { centre(&triangles[0]) };
     let radius = triangles.iter().flatten().map(|x| (x - middle).norm()).fold(0.0, f64::max);
-    let own = nodes.len();
+    let index = nodes.len();
     let dipole = triangles.iter().map(area).sum();
     nodes.push(Node { middle, dipole, radius, range: [offset, offset + triangles.len()], second: None });
     if triangles.len() <= LEAF {
@@ -85,7 +85,7 @@ fn divide(triangles: &mut [[Vector3; 3]], offset: usize, nodes: &mut Vec<Node>) 
     triangles.select_nth_unstable_by(half, |a, b| centre(a)[axis].total_cmp(&centre(b)[axis]));
     let (left, right) = triangles.split_at_mut(half);
     divide(left, offset, nodes);
-    nodes[own].second = Some(nodes.len());
+    nodes[index].second = Some(nodes.len());
     divide(right, offset + half, nodes);
 }
 

@@ -224,11 +224,11 @@ impl Complex {
     /// Points joined to a point by an edge, increasing.
     pub(crate) fn neighbours(&self, point: u32) -> Vec<u32> {
         let tets = self.star[point as usize].iter();
-        let mut all: Vec<u32> =
+        let mut neighbours: Vec<u32> =
             tets.flat_map(|&tet| self.tets[tet as usize]).filter(|&other| other != point).collect();
-        all.sort_unstable();
-        all.dedup();
-        all
+        neighbours.sort_unstable();
+        neighbours.dedup();
+        neighbours
     }
 
     /// Removes a tet.
@@ -314,7 +314,7 @@ impl Complex {
     pub(crate) fn may_collapse(&self, u: u32, v: u32) -> bool {
         let stars = [u, v].map(|point| self.star[point as usize].as_slice());
         let materials: Sides =
-            stars.concat().iter().fold(0, |all, &tet| all | 1 << self.material[tet as usize]);
+            stars.concat().iter().fold(0, |sides, &tet| sides | 1 << self.material[tet as usize]);
         if !self.link_condition(u, v, |_| true) {
             return false;
         }
@@ -398,10 +398,10 @@ fn lone(faces: Vec<[u32; 3]>) -> Vec<[u32; 3]> {
     faces.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() == 1).map(|same| same[0].1).collect()
 }
 
-fn distinct<T: Ord>(mut all: Vec<T>) -> Vec<T> {
-    all.sort_unstable();
-    all.dedup();
-    all
+fn distinct<T: Ord>(mut values: Vec<T>) -> Vec<T> {
+    values.sort_unstable();
+    values.dedup();
+    values
 }
 
 /// The intersection of two sorted lists.

@@ -43,8 +43,8 @@ pub(crate) fn cut_materials(complex: &mut Complex, surfaces: &Surfaces<'_>) {
         let inside = |point: &Vector3| surfaces.inside(material, point);
         let values = complex.points.iter().map(inside).collect();
         let sides = Surface { inside: &inside }.cut(complex, values);
-        let own = sides.into_iter().filter(|(_, side)| *side > 0.0).map(|(tet, _)| (tet, material));
-        give(complex, own.collect());
+        let taken = sides.into_iter().filter(|(_, side)| *side > 0.0).map(|(tet, _)| (tet, material));
+        give(complex, taken.collect());
     }
     // Flat tets where many materials meet can have a side of no material; the first one may be far away.
     let lost = |&tet: &u32| {

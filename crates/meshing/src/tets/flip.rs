@@ -133,8 +133,8 @@ impl Complex {
                 best[i][k] = f64::NEG_INFINITY;
                 for j in i + 1..k {
                     let [a, b, c] = [ring[i], ring[j], ring[k]];
-                    let own = self.length_of([a, b, c, q]).min(self.length_of([a, c, b, p]));
-                    let least = own.min(best[i][j]).min(best[j][k]);
+                    let length = self.length_of([a, b, c, q]).min(self.length_of([a, c, b, p]));
+                    let least = length.min(best[i][j]).min(best[j][k]);
                     if least > best[i][k] {
                         (best[i][k], split[i][k]) = (least, j);
                     }

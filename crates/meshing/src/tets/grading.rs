@@ -175,7 +175,7 @@ fn cubes_over(tree: &Octree, level: usize, low: &Vector3, high: &Vector3) -> Res
 /// Requires cubes of a level in and around a label.
 fn protect(tree: &mut Octree, anatomy: &Anatomy<'_>, label: i32, level: usize) -> Result<(), MeshingError> {
     let labels = anatomy.labels();
-    let Some(number) = labels.iter().position(|own| *own == label) else {
+    let Some(number) = labels.iter().position(|known| *known == label) else {
         return Err(MeshingError::NoSuchLabel { label, labels });
     };
     let size = tree.size(level);
@@ -263,12 +263,12 @@ fn near_body(
     let mut number = vec![u32::MAX; points.len()];
     let mut used = Vec::new();
     for node in kept.iter_mut().flatten() {
-        let own = &mut number[*node as usize];
-        if *own == u32::MAX {
-            *own = used.len() as u32;
+        let numbered = &mut number[*node as usize];
+        if *numbered == u32::MAX {
+            *numbered = used.len() as u32;
             used.push(*node as usize);
         }
-        *node = *own;
+        *node = *numbered;
     }
     let sizes = used.iter().map(|&node| sizes[node]).collect();
     (used.iter().map(|&node| points[node]).collect(), sizes, kept)

@@ -61,7 +61,7 @@ impl Guard {
         self.round.resize(complex.points.len(), Vec::new());
         for &point in points {
             let rim = complex.rim_of(point, |_| true);
-            let is_there = |face: &[u32; 3]| rim.iter().any(|own| key(*own) == key(*face));
+            let is_there = |face: &[u32; 3]| rim.iter().any(|other| key(*other) == key(*face));
             for number in std::mem::take(&mut self.round[point as usize]) {
                 let face = self.faces[number as usize];
                 if self.is_gone[number as usize] {
@@ -134,13 +134,13 @@ impl Guard {
         is_replaced: &dyn Fn(&[u32; 3]) -> bool,
     ) -> bool {
         let before = |node: u32| complex.points[node as usize];
-        for (k, &own) in new.iter().enumerate() {
-            if new[..k].iter().any(|&other| meet(at, own, other).is_some()) {
+        for (k, &triangle) in new.iter().enumerate() {
+            if new[..k].iter().any(|&other| meet(at, triangle, other).is_some()) {
                 return false;
             }
             let room =
-                CLEARANCE * own.iter().map(|&n| complex.size[n as usize]).fold(f64::INFINITY, f64::min);
-            let [low, high] = box_of(own.map(at));
+                CLEARANCE * triangle.iter().map(|&n| complex.size[n as usize]).fold(f64::INFINITY, f64::min);
+            let [low, high] = box_of(triangle.map(at));
             let [low, high] = [low.add_scalar(-room), high.add_scalar(room)];
             for number in self.boxes.near([low, high]) {
                 let other = self.faces[number as usize];
@@ -152,13 +152,13 @@ impl Guard {
                 if (0..3).any(|axis| least[axis] > high[axis] || most[axis] < low[axis]) {
                     continue;
                 }
-                if meet(at, own, other).is_some() {
+                if meet(at, triangle, other).is_some() {
                     return false;
                 }
-                if own.iter().all(|node| !other.contains(node)) {
-                    let gap = distance(&own.map(at), &corners);
+                if triangle.iter().all(|node| !other.contains(node)) {
+                    let gap = distance(&triangle.map(at), &corners);
                     // Faces that are nearer already may only move apart.
-                    if gap < room && gap < distance(&own.map(before), &corners) {
+                    if gap < room && gap < distance(&triangle.map(before), &corners) {
                         return false;
                     }
                 }
@@ -173,14 +173,14 @@ fn box_of(corners: [Vector3; 3]) -> [Vector3; 2] {
 }
 
 /// Distance of two triangles that do not cross [m]: from a corner to a triangle, or between two edges.
-fn distance(own: &[Vector3; 3], other: &[Vector3; 3]) -> f64 {
+fn distance(triangle: &[Vector3; 3], other: &[Vector3; 3]) -> f64 {
     let from = |corner: &Vector3, face: &[Vector3; 3]| {
         let weights = barycentric_of_closest(face, corner);
         (corner - face[0] * weights[0] - face[1] * weights[1] - face[2] * weights[2]).norm()
     };
-    let corners = own.iter().map(|x| from(x, other)).chain(other.iter().map(|x| from(x, own)));
+    let corners = triangle.iter().map(|x| from(x, other)).chain(other.iter().map(|x| from(x, triangle)));
     let edge = |face: &[Vector3; 3], k: usize| [face[k], face[(k + 1) % 3]];
-    let edges = (0..9).map(|k| of_edges(edge(own, k / 3), edge(other, k % 3)));
+    let edges = (0..9).map(|k| of_edges(edge(triangle, k / 3), edge(other, k % 3)));
     corners.chain(edges).fold(f64::INFINITY, f64::min)
 }
 
@@ -206,9 +206,9 @@ mod tests {
     fn distances_of_triangles_are_those_of_their_nearest_points() {
         let mut random = Random::new(3);
         for _ in 0..200 {
-            let [own, mut other] = [0, 1].map(|_| [0, 1, 2].map(|_| Vector3::from(random.vector())));
+            let [triangle, mut other] = [0, 1].map(|_| [0, 1, 2].map(|_| Vector3::from(random.vector())));
             other.iter_mut().for_each(|x| x.z += 2.5);
-            let found = distance(&own, &other);
+            let found = distance(&triangle, &other);
             let points = |face: &[Vector3; 3]| -> Vec<Vector3> {
                 let n = 24;
                 (0..=n)
@@ -216,7 +216,7 @@ mod tests {
                     .map(|w| (0..3).map(|k| face[k] * (w[k] as f64 / n as f64)).sum())
                     .collect()
             };
-            let (first, second) = (points(&own), points(&other));
+            let (first, second) = (points(&triangle), points(&other));
             let nearest = first
                 .iter()
                 .flat_map(|x| second.iter().map(move |y| (x - y).norm()))

@@ -247,8 +247,8 @@ impl Samples {
         let from = self.grid.triple(at);
         let axes = self.grid.axes;
         let side = 2 * reach + 1;
-        let own = side.pow(3) / 2;
-        (0..side.pow(3)).filter(move |&way| way != own).filter_map(move |way| {
+        let middle = side.pow(3) / 2;
+        (0..side.pow(3)).filter(move |&way| way != middle).filter_map(move |way| {
             let shift = [way % side, way / side % side, way / side / side];
             let mut to = [0; 3];
             for axis in 0..3 {
@@ -289,7 +289,7 @@ fn inner_rows(
             for j in range(1, ny) {
                 let [y, z] = off(j + ny * k);
                 let at = [j as f64 + y, k as f64 + z];
-                let weights = [area(at, q, r), area(p, at, r), area(p, q, at)].map(|own| own / whole);
+                let weights = [area(at, q, r), area(p, at, r), area(p, q, at)].map(|part| part / whole);
                 if weights.iter().all(|&weight| weight >= 0.0) {
                     let x = a.x * weights[0] + b.x * weights[1] + c.x * weights[2];
                     // A normal against the row is an entrance.

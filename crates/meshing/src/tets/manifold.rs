@@ -73,7 +73,7 @@ fn move_apart(complex: &mut Complex) {
             places.entry([place.x, place.y, place.z].map(f64::to_bits)).or_default().push(point);
         }
     }
-    for point in places.into_values().filter(|own| own.len() > 1).flatten() {
+    for point in places.into_values().filter(|points| points.len() > 1).flatten() {
         move_inwards(complex, point);
     }
 }

@@ -292,16 +292,16 @@ mod tests {
         let body = Plates { plate: 0.002, gap: 0.002 };
         // Centres of cubes at ± 4, 12, ... mm from the middle: none in the plate or the gap.
         let cubes = Voxels::new(0.008).mesh(&body).unwrap().mesh;
-        let told = missed(&cubes, &body, 0.008);
+        let reported = missed(&cubes, &body, 0.008);
         let near = |found: f64| (found - 0.002).abs() < 2e-4;
         let [Missed::ThinPart { place, thickness, .. }, Missed::ThinGap { place: gap, thickness: width, .. }] =
-            told[..]
+            reported[..]
         else {
-            panic!("{told:?}")
+            panic!("{reported:?}")
         };
-        assert!(near(thickness) && place[0] > 0.03 && place[2].abs() < 2e-4, "{told:?}");
-        assert!(near(width) && gap[0] < 0.01 && (gap[2] - 0.001).abs() < 2e-4, "{told:?}");
-        assert!(told[0].to_string().contains("2.0 mm thick at (0.0"), "{}", told[0]);
+        assert!(near(thickness) && place[0] > 0.03 && place[2].abs() < 2e-4, "{reported:?}");
+        assert!(near(width) && gap[0] < 0.01 && (gap[2] - 0.001).abs() < 2e-4, "{reported:?}");
+        assert!(reported[0].to_string().contains("2.0 mm thick at (0.0"), "{}", reported[0]);
     }
 
     #[test]
@@ -309,8 +309,8 @@ mod tests {
         let body = Plates { plate: 0.002, gap: 0.004 };
         let request = OrganTets { origin: Some(Vector3::new(0.0, 0.0, 0.0025)), ..OrganTets::new(0.01) };
         let mesh = request.mesh(&Anatomy::new(1, &body), &|_| {}).unwrap().mesh;
-        let told = missed(&mesh, &body, 0.01);
-        assert!(matches!(told[..], [Missed::ThinPart { .. }]), "{told:?}");
+        let reported = missed(&mesh, &body, 0.01);
+        assert!(matches!(reported[..], [Missed::ThinPart { .. }]), "{reported:?}");
     }
 
     #[test]

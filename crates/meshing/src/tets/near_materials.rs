@@ -68,9 +68,9 @@ impl NearMaterials {
     /// The materials that a point can be in; all where no box is near.
     pub(crate) fn of(&self, point: &Vector3) -> impl Iterator<Item = usize> {
         let [i, j, k] = self.cube(point);
-        let own = &self.cubes[i + self.dims[0] * (j + self.dims[1] * k)];
-        let all = 1..=if own.is_empty() { self.materials } else { 0 };
-        own.iter().copied().chain(all)
+        let listed = &self.cubes[i + self.dims[0] * (j + self.dims[1] * k)];
+        let fallback = 1..=if listed.is_empty() { self.materials } else { 0 };
+        listed.iter().copied().chain(fallback)
     }
 
     /// True if a point is outside of the box of a material and an edge round it.

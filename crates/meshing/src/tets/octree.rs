@@ -183,7 +183,7 @@ impl Octree {
     fn towards_equal(&self, level: usize, cube: Cube, axis: usize, nodes: &Nodes, tets: &mut Vec<[u32; 4]>) {
         let mut other = cube;
         other[axis] += 1;
-        let [own, beyond] = [cube, other].map(|cube| nodes.number(centre(level, cube)));
+        let [near, beyond] = [cube, other].map(|cube| nodes.number(centre(level, cube)));
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
         let ring = [[0, 0], [1, 0], [1, 1], [0, 1]];
         // Across which side of the square the cubes lie that share its edge.
@@ -204,9 +204,9 @@ impl Octree {
             let [p, q] = [from, to].map(|place| nodes.number(place));
             if is_halved {
                 let middle = nodes.number([0, 1, 2].map(|axis| (from[axis] + to[axis]) / 2));
-                tets.extend([[own, beyond, p, middle], [own, beyond, middle, q]]);
+                tets.extend([[near, beyond, p, middle], [near, beyond, middle, q]]);
             } else {
-                tets.push([own, beyond, p, q]);
+                tets.push([near, beyond, p, q]);
             }
         }
     }
@@ -221,7 +221,7 @@ impl Octree {
         nodes: &Nodes,
         tets: &mut Vec<[u32; 4]>,
     ) {
-        let own = nodes.number(centre(level, cube));
+        let near = nodes.number(centre(level, cube));
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
         // In the grid of the halves: the layer of corners between, and the layer of halves beyond.
         let between = 2 * (cube[axis] + i32::from(side > 0));
@@ -237,7 +237,7 @@ impl Octree {
             let beyond = nodes.number(centre(level - 1, half));
             let (middle, far) = (of_square(1, 1), of_square(2 * du, 2 * dv));
             for third in [of_square(2 * du, 1), of_square(1, 2 * dv)] {
-                tets.extend([[own, middle, far, third], [beyond, middle, far, third]]);
+                tets.extend([[near, middle, far, third], [beyond, middle, far, third]]);
             }
         }
     }

@@ -293,9 +293,9 @@ impl<'a> Optimiser<'a> {
     fn hand_over(&mut self, threshold: f64) {
         let mut given = 0;
         for tet in self.below(threshold / 2.0) {
-            let own = self.complex.material[tet as usize];
+            let current = self.complex.material[tet as usize];
             // Area [m²] of the faces towards each material.
-            let mut towards: Vec<(u8, f64)> = vec![(own, 0.0)];
+            let mut towards: Vec<(u8, f64)> = vec![(current, 0.0)];
             for face in self.complex.faces(tet) {
                 let Some(other) = self.complex.behind(tet, face) else { continue };
                 let material = self.complex.material[other as usize];
@@ -312,7 +312,7 @@ impl<'a> Optimiser<'a> {
                 .iter()
                 .skip(1)
                 .fold(towards[0], |most, other| if other.1 > most.1 { *other } else { most });
-            if most.0 != own {
+            if most.0 != current {
                 self.complex.material[tet as usize] = most.0;
                 let nodes = self.complex.tets[tet as usize];
                 self.complex.find_sides_of(&nodes);
@@ -388,13 +388,13 @@ impl<'a> Optimiser<'a> {
 
     /// Best place of the joined point, if that is better than before.
     fn best_collapse(&self, gone: u32, kept: u32, threshold: f64) -> Option<Vector3> {
-        let [own, other] = [gone, kept].map(|node| self.complex.sides[node as usize]);
-        if own & !other != 0 {
+        let [gone_sides, kept_sides] = [gone, kept].map(|node| self.complex.sides[node as usize]);
+        if gone_sides & !kept_sides != 0 {
             return None;
         }
         let [from, to] = [gone, kept].map(|node| self.complex.points[node as usize]);
         let middle = (from + to) / 2.0;
-        let places = match (own == other, own.count_ones()) {
+        let places = match (gone_sides == kept_sides, gone_sides.count_ones()) {
             (false, _) => vec![to],
             (true, 1) => vec![middle, from, to],
             (true, _) => self.project(kept, middle).into_iter().chain([from, to]).collect(),
@@ -541,7 +541,10 @@ impl<'a> Optimiser<'a> {
             let off = |point: Vector3| self.surfaces.off(sides, &point).powi(2);
             [area * (off((a + b + c) / 3.0) + off((a + b) / 2.0) + off((a + c) / 2.0)) / 3.0, area]
         };
-        faces.iter().map(of_face).fold([0.0; 2], |[misfit, all], [own, area]| [misfit + own, all + area])
+        faces
+            .iter()
+            .map(of_face)
+            .fold([0.0; 2], |[misfit, total], [part, area]| [misfit + part, total + area])
     }
 
     /// Moves the chosen points whose worst tet is below the threshold to the best of some places round them;

@@ -198,7 +198,7 @@ impl OrganTets {
         // diagonal.
         let far = (self.edge / 2.0).max(anatomy.resolution());
         let lost = |complex: &Complex| {
-            samples.as_ref().map_or_else(Vec::new, |own| own.lost(&own.within_tets(complex), far))
+            samples.as_ref().map_or_else(Vec::new, |sampled| sampled.lost(&sampled.within_tets(complex), far))
         };
         let volumes = |complex: &Complex| wanted_volumes(anatomy, &lost(complex));
         let is_tight = mended.doubled + mended.parted > 0;
@@ -287,8 +287,8 @@ fn finer(wanted: &mut Wanted, tree: &Octree, measured: &Measured, distance: f64)
 fn wanted_volumes(anatomy: &Anatomy<'_>, lost: &[LostPart]) -> Vec<Option<f64>> {
     let mut volumes = anatomy.volumes().to_vec();
     for part in lost {
-        for (volume, own) in volumes.iter_mut().zip(&part.volumes) {
-            *volume = volume.map(|volume| volume - own);
+        for (volume, missing) in volumes.iter_mut().zip(&part.volumes) {
+            *volume = volume.map(|volume| volume - missing);
         }
     }
     volumes[0] = volumes.iter().copied().sum();
@@ -624,9 +624,9 @@ impl TetReport {
         for (cell, &material) in block.cells().zip(material) {
             let corners = [0, 1, 2, 3].map(|at| mesh.points[cell[at] as usize]);
             lengths.push((corners.iter().sum::<Vector3>() / 4.0, acoustic_length(CellKind::Tet, &corners)));
-            let own = &mut materials[usize::from(material) - 1];
-            own.tets += 1;
-            own.volume += volume(CellKind::Tet, &corners);
+            let report = &mut materials[usize::from(material) - 1];
+            report.tets += 1;
+            report.volume += volume(CellKind::Tet, &corners);
             cell.iter().for_each(|&node| around[node as usize] += 1);
         }
         let Spread { min, median, .. } =

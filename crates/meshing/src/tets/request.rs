@@ -60,8 +60,8 @@ impl OrganTets {
 
     /// Gives labels smaller cells: of the edge given [m], or else of half the edge of the others.
     pub fn protecting(self, labels: &[(i32, Option<f64>)]) -> Self {
-        let own = |&(label, edge): &(i32, Option<f64>)| (label, edge.unwrap_or(self.edge / 2.0));
-        Self { protect: labels.iter().map(own).collect(), ..self }
+        let with_edge = |&(label, edge): &(i32, Option<f64>)| (label, edge.unwrap_or(self.edge / 2.0));
+        Self { protect: labels.iter().map(with_edge).collect(), ..self }
     }
 
     /// The edge [m] that the field of a body must resolve: the shortest edge, or the requested distance.

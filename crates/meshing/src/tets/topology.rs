@@ -57,7 +57,7 @@ pub(crate) fn large_components(
 /// The faces of the volume cells of a mesh between different labels (cell data `label`) and to the outside,
 /// quads as two triangles.
 pub(crate) fn faces_between_labels(mesh: &Mesh) -> Patches {
-    let mut all: Vec<([u32; 4], Vec<u32>, i32)> = Vec::new();
+    let mut faces: Vec<([u32; 4], Vec<u32>, i32)> = Vec::new();
     for block in mesh.volume_blocks() {
         let labels = block.data.get("label").map_or(&[][..], |labels| &labels.values);
         // Without labels, all cells have one label that is not the outside.
@@ -68,19 +68,19 @@ pub(crate) fn faces_between_labels(mesh: &Mesh) -> Patches {
                 let mut key = [u32::MAX; 4];
                 key[..nodes.len()].copy_from_slice(&nodes);
                 key.sort_unstable();
-                all.push((key, nodes, label));
+                faces.push((key, nodes, label));
             }
         }
     }
-    all.sort_unstable();
+    faces.sort_unstable();
     let mut found = Patches { points: mesh.points.clone(), ..Patches::default() };
-    for same in all.chunk_by(|a, b| a.0 == b.0) {
+    for same in faces.chunk_by(|a, b| a.0 == b.0) {
         let other = if same.len() == 1 { OUTSIDE_LABEL } else { same[same.len() - 1].2 };
-        let (nodes, own) = (&same[0].1, same[0].2);
-        if own != other {
+        let (nodes, label) = (&same[0].1, same[0].2);
+        if label != other {
             for k in 2..nodes.len() {
                 found.triangles.push([nodes[0], nodes[k - 1], nodes[k]]);
-                found.sides.push(sorted([own, other]));
+                found.sides.push(sorted([label, other]));
             }
         }
     }

@@ -92,8 +92,8 @@ fn a_hundred_labels_are_as_many_materials() {
         (1 + i + 5 * (j + 5 * k)) as i32
     };
     let labels = (0..grid.len()).map(cube).collect();
-    let all: Vec<i32> = (1..=100).collect();
-    let body = anatomy(&LabelImage { grid, labels }, &all);
+    let numbers: Vec<i32> = (1..=100).collect();
+    let body = anatomy(&LabelImage { grid, labels }, &numbers);
     let made = meshed(&body, 0.002, Vector3::zeros());
     check_sound(&made);
     for material in &made.report.materials {
@@ -104,8 +104,8 @@ fn a_hundred_labels_are_as_many_materials() {
     for (cell, label) in block.cells().zip(&block.data["label"].values) {
         let centre = cell.iter().map(|&node| made.mesh.points[node as usize]).sum::<Vector3>() / 4.0;
         let cube = centre.map(|x| ((x / 1e-3 + 0.5) / 8.0).floor());
-        let own = [(*label as i32 - 1) % 5, (*label as i32 - 1) / 5 % 5, (*label as i32 - 1) / 25];
-        let far = (0..3).map(|axis| (cube[axis] - f64::from(own[axis])).abs()).fold(0.0, f64::max);
+        let expected = [(*label as i32 - 1) % 5, (*label as i32 - 1) / 5 % 5, (*label as i32 - 1) / 25];
+        let far = (0..3).map(|axis| (cube[axis] - f64::from(expected[axis])).abs()).fold(0.0, f64::max);
         assert!(far <= 1.0, "a cell of label {label} at {centre}");
     }
 }
@@ -461,8 +461,11 @@ fn what_is_lost_is_named_and_does_not_inflate_the_rest() {
     let [lost] = made.report.lost[..] else { panic!("{}", made.report) };
     assert!((lost.volume / disc - 1.0).abs() < 0.05, "{lost:?} of {disc:e}");
     assert!(lost.label == 7 && lost.place[0].hypot(lost.place[1]) > 0.028 && lost.place[2].abs() < 0.001);
-    let told = made.report.doubts().join("\n");
-    assert!(told.contains("lacks parts of the body: 1.") && told.contains(" ml of label 7 at ("), "{told}");
+    let doubts = made.report.doubts().join("\n");
+    assert!(
+        doubts.contains("lacks parts of the body: 1.") && doubts.contains(" ml of label 7 at ("),
+        "{doubts}"
+    );
 }
 
 /// A ball of 10 mm in triangles of 8 mm is a fifth too small unless its points move out.

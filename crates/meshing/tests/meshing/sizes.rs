@@ -92,15 +92,15 @@ fn labels_that_are_off_are_told_and_better_where_they_are_protected() {
     let coarse = plain.mesh(&block, &|_| {}).expect("a mesh");
     let found = Assessment::of(&coarse.mesh, &block, edge).expect("a body");
     assert_eq!(found.deviation.to, MeasuredTo::Voxels);
-    let told = |found: &Assessment, label: i32| {
+    let reports = |found: &Assessment, label: i32| {
         found.missed.iter().any(|missed| match missed {
-            Missed::Label { label: own }
-            | Missed::LabelVolume { label: own, .. }
-            | Missed::LabelAway { label: own, .. } => *own == label,
+            Missed::Label { label: missing }
+            | Missed::LabelVolume { label: missing, .. }
+            | Missed::LabelAway { label: missing, .. } => *missing == label,
             _ => false,
         })
     };
-    assert!(told(&found, 3), "{:?}", found.missed);
+    assert!(reports(&found, 3), "{:?}", found.missed);
     let between = |found: &Assessment| {
         let interface = found.regions.interfaces.iter().find(|interface| interface.labels == [1, 2]);
         interface.expect("the image has it").distances.map(|distances| distances.p95_from_body)
@@ -114,16 +114,19 @@ fn labels_that_are_off_are_told_and_better_where_they_are_protected() {
             let label = material.label;
             let part = material.volume / material.voxel_volume.expect("the image knows") - 1.0;
             let volume = found.missed.iter().find_map(|missed| match missed {
-                Missed::LabelVolume { label: own, part } if *own == label => Some(*part),
+                Missed::LabelVolume { label: missing, part } if *missing == label => Some(*part),
                 _ => None,
             });
             println!("label {label}: {part:+.4}, told {volume:?}");
             assert_eq!(volume.is_some(), part.abs() > 0.05 && material.tets > 0, "{label}: {part}");
-            assert!(volume.is_none_or(|told| (told - part).abs() < 1e-9), "{label}: {part}, {volume:?}");
+            assert!(
+                volume.is_none_or(|reported| (reported - part).abs() < 1e-9),
+                "{label}: {part}, {volume:?}"
+            );
         }
     }
     // The sharp corners of the block are still cut.
-    assert!(!told(&better, 2) && !told(&better, 3), "{:?}", better.missed);
+    assert!(!reports(&better, 2) && !reports(&better, 3), "{:?}", better.missed);
     assert!(off(&fine, 2) < 0.02 && off(&fine, 3) < 0.05, "{}", fine.report);
     assert!(between(&better).is_some_and(|better| better < between(&found).unwrap_or(f64::INFINITY)));
     assert!(fine.report.acoustic_part > 0.6, "{}", fine.report);
@@ -142,10 +145,15 @@ fn cells_are_larger_inside_and_the_threads_never_change_a_bit() {
     let made = graded.mesh(&ball, &|_| {}).expect("a mesh");
     println!("{}", made.report);
     check_sound(&made);
-    let all = even.mesh(&ball, &|_| {}).expect("a mesh");
-    assert!(4 * made.report.tets < 3 * all.report.tets, "{} of {}", made.report.tets, all.report.tets);
+    let uniform = even.mesh(&ball, &|_| {}).expect("a mesh");
+    assert!(
+        4 * made.report.tets < 3 * uniform.report.tets,
+        "{} of {}",
+        made.report.tets,
+        uniform.report.tets
+    );
     assert!(made.report.acoustic_part >= 0.7 && made.report.dihedral[0] > 10.0, "{}", made.report);
-    assert!((tet_volume(&made.mesh) / tet_volume(&all.mesh) - 1.0).abs() < 0.005);
+    assert!((tet_volume(&made.mesh) / tet_volume(&uniform.mesh) - 1.0).abs() < 0.005);
     assert!(made.report.edges.longest > 0.009 && made.report.edges.longest < 0.016);
     let bits = |made: &OrganMesh| -> Vec<u64> {
         made.mesh.points.iter().flat_map(|point| point.iter().map(|x| x.to_bits())).collect()

@@ -28,9 +28,9 @@ fn volume(surface: &TriangleMesh) -> f64 {
 
 /// Distances both ways, and the error of the volume.
 fn measure(made: &TriangleMesh, truth: &TriangleMesh) -> (Hausdorff, f64) {
-    let (own, part) = (Hausdorff::between(made, truth, 0.004), volume(made) / volume(truth) - 1.0);
-    println!("{} triangles, {own}, volume {:+.3} %", made.len(), 100.0 * part);
-    (own, part)
+    let (distances, part) = (Hausdorff::between(made, truth, 0.004), volume(made) / volume(truth) - 1.0);
+    println!("{} triangles, {distances}, volume {:+.3} %", made.len(), 100.0 * part);
+    (distances, part)
 }
 
 fn truth(organ: Organ) -> TriangleMesh {
@@ -42,8 +42,8 @@ fn truth(organ: Organ) -> TriangleMesh {
 #[test]
 fn the_surface_of_the_livers_labels_is_close_to_the_liver() {
     let made = surface(&organs::liver(), &SURFACE_SMOOTHING, SURFACE_PAIRS);
-    let (own, part) = measure(&made, &truth(Organ::Liver));
-    assert!(own.largest() < VOXEL / 2.0 && own.rms_forward < VOXEL / 10.0, "{own}");
+    let (distances, part) = measure(&made, &truth(Organ::Liver));
+    assert!(distances.largest() < VOXEL / 2.0 && distances.rms_forward < VOXEL / 10.0, "{distances}");
     assert!(part.abs() < 1e-3, "{part}");
     assert!(made.is_closed());
 }
