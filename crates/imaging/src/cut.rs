@@ -51,7 +51,7 @@ impl Image {
     pub fn choose(&mut self, choices: &[LabelChoice]) -> Result<Choice, LabelError> {
         let present = self.survey()?;
         let (mut chosen, mut groups) = (Vec::new(), Vec::new());
-        let mut all = BTreeSet::new();
+        let mut taken = BTreeSet::new();
         for choice in choices {
             let labels = LabelChoice::resolve(std::slice::from_ref(choice), &self.names, &present)?;
             if labels.contains(&0) {
@@ -60,7 +60,7 @@ impl Image {
             if let Some(&label) = labels.iter().find(|label| !present.contains(label)) {
                 return Err(LabelError::Absent { label, present });
             }
-            if let Some(&label) = labels.iter().find(|&&label| !all.insert(label)) {
+            if let Some(&label) = labels.iter().find(|&&label| !taken.insert(label)) {
                 return Err(LabelError::Repeated { label });
             }
             match (choice, labels.first()) {
@@ -123,7 +123,8 @@ impl Image {
                     let mut voxel = [0; 3];
                     (voxel[p], voxel[q], voxel[axis]) = (at % dims[p], at / dims[p], side * (dims[axis] - 1));
                     let label = self.chosen(choice, voxel[0] + dims[0] * (voxel[1] + dims[1] * voxel[2]));
-                    if let Some((_, border)) = borders.iter_mut().find(|(own, _)| *own == label && label != 0)
+                    if let Some((_, border)) =
+                        borders.iter_mut().find(|(known, _)| *known == label && label != 0)
                     {
                         let mut one = [[0; 2]; 3];
                         one[axis][side] = 1;
@@ -217,10 +218,10 @@ impl Image {
                 votes.clear();
                 for (z, y) in range(2, k).flat_map(|z| range(1, j).map(move |y| (z, y))) {
                     for x in range(0, i) {
-                        let own = self.chosen(choice, x + nx * (y + ny * z));
-                        match votes.iter_mut().find(|(label, _)| *label == own) {
+                        let vote = self.chosen(choice, x + nx * (y + ny * z));
+                        match votes.iter_mut().find(|(label, _)| *label == vote) {
                             Some((_, count)) => *count += 1,
-                            None => votes.push((own, 1)),
+                            None => votes.push((vote, 1)),
                         }
                     }
                 }
@@ -275,10 +276,10 @@ mod tests {
         let cut = image.cut(&Choice::Labels(vec![4, 9]), f64::INFINITY, &|_| {}).unwrap();
         assert_eq!((cut.labels.grid.dims, cut.factors, cut.note()), ([5, 3, 3], [1; 3], None));
         let whole = image.labels().unwrap().regions();
-        for (own, expected) in cut.labels.regions().iter().zip([&whole[0], &whole[2]]) {
-            assert_eq!((own.label, own.voxels), (expected.label, expected.voxels));
-            let off = Vector3::from(own.low) - Vector3::from(expected.low);
-            assert!(off.norm() < 1e-12, "{own} {expected}");
+        for (region, expected) in cut.labels.regions().iter().zip([&whole[0], &whole[2]]) {
+            assert_eq!((region.label, region.voxels), (expected.label, expected.voxels));
+            let off = Vector3::from(region.low) - Vector3::from(expected.low);
+            assert!(off.norm() < 1e-12, "{region} {expected}");
         }
         assert!(matches!(image.cut(&Choice::From(10.0), 1.0, &|_| {}), Err(LabelError::Absent { .. })));
     }
@@ -286,15 +287,15 @@ mod tests {
     #[test]
     fn sides_of_the_border_are_those_of_the_patient() {
         let mut image = image([4, 4, 4], |[i, _, k]| if i == 0 && k >= 2 { 3 } else { 0 });
-        let told = |image: &Image| {
+        let described = |image: &Image| {
             let borders = image.border(&Choice::Labels(vec![3]));
             borders.iter().map(|(label, border)| format!("{label}: {border}")).collect::<Vec<_>>()
         };
         let expected = "3: 8 voxels on the left side, 2 voxels on the back side, 2 voxels on the front side, 4 voxels on the head side";
-        assert_eq!(told(&image), [expected]);
+        assert_eq!(described(&image), [expected]);
         let axes = image.grid.axes * Matrix3::from_diagonal(&Vector3::new(-1.0, 1.0, 1.0));
         image.grid = Grid::new(image.grid.dims, image.grid.origin, axes).unwrap();
-        assert_eq!(told(&image), [expected.replace("left", "right")]);
+        assert_eq!(described(&image), [expected.replace("left", "right")]);
         assert_eq!(image.border(&Choice::From(4.0)), []);
     }
 

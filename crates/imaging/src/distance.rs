@@ -180,10 +180,10 @@ impl Envelope {
         self.parabolas.clear();
         self.from.clear();
         for (at, &site) in line.iter().enumerate().filter(|(_, site)| **site != NONE) {
-            let (place, own) = (at as f64 * step, height(site));
+            let (place, vertex) = (at as f64 * step, height(site));
             let mut start = f64::NEG_INFINITY;
             while let Some(&(other, lower, _)) = self.parabolas.last() {
-                start = ((own + place * place) - (lower + other * other)) / (2.0 * (place - other));
+                start = ((vertex + place * place) - (lower + other * other)) / (2.0 * (place - other));
                 if self.from.last().is_some_and(|&from| start <= from) {
                     self.parabolas.pop();
                     self.from.pop();
@@ -192,7 +192,7 @@ impl Envelope {
                     break;
                 }
             }
-            self.parabolas.push((place, own, site));
+            self.parabolas.push((place, vertex, site));
             self.from.push(start);
         }
         if self.parabolas.is_empty() {

@@ -145,8 +145,8 @@ impl Counts {
 
     fn and(mut self, other: Self) -> Self {
         for (label, [voxels, runs]) in other.values {
-            let own = self.values.entry(label).or_default();
-            *own = [own[0] + voxels, own[1] + runs];
+            let counts = self.values.entry(label).or_default();
+            *counts = [counts[0] + voxels, counts[1] + runs];
         }
         self.more |= other.more || self.values.len() > MOST_VALUES;
         self
@@ -438,9 +438,9 @@ mod tests {
     #[test]
     fn the_content_tells_images_apart_and_not_their_names() {
         let content = |image: &Image| {
-            let mut all = Vec::new();
-            image.content(|piece| all.extend_from_slice(piece));
-            all
+            let mut bytes = Vec::new();
+            image.content(|piece| bytes.extend_from_slice(piece));
+            bytes
         };
         let first = image([1, 2], 1.0, 1e-3);
         assert_eq!(content(&first), content(&Image { format: "there".into(), ..first.clone() }));

@@ -65,7 +65,7 @@ impl fmt::Display for RegionReport {
 
 impl RegionReport {
     /// Every label but 0, increasing.
-    pub(crate) fn all(grid: &Grid, label: impl Fn(usize) -> i32) -> Vec<Self> {
+    pub(crate) fn of_labels(grid: &Grid, label: impl Fn(usize) -> i32) -> Vec<Self> {
         let components = Components::new(grid.dims, label, 0);
         let [nx, ny, nz] = grid.dims;
         let mut found: BTreeMap<i32, Self> = BTreeMap::new();
@@ -162,9 +162,9 @@ impl Components {
         joined
     }
 
-    fn join_rows(&mut self, own: std::ops::Range<usize>, other: std::ops::Range<usize>) {
-        let (mut a, mut b) = (own.start, other.start);
-        while a < own.end && b < other.end {
+    fn join_rows(&mut self, row: std::ops::Range<usize>, other: std::ops::Range<usize>) {
+        let (mut a, mut b) = (row.start, other.start);
+        while a < row.end && b < other.end {
             let (x, y) = (self.runs[a], self.runs[b]);
             if x.label == y.label && x.from < y.to && y.from < x.to {
                 let [p, q] = [self.find(a as u32), self.find(b as u32)];
@@ -219,7 +219,7 @@ impl Image {
     pub fn regions(&self, progress: &dyn Fn(f64)) -> Result<Vec<RegionReport>, LabelError> {
         self.survey()?;
         progress(0.3);
-        let mut regions = RegionReport::all(&self.grid, |at| self.label(at));
+        let mut regions = RegionReport::of_labels(&self.grid, |at| self.label(at));
         for region in &mut regions {
             region.name = self.names.get(region.label).map(str::to_owned);
         }
@@ -231,7 +231,7 @@ impl Image {
 impl LabelImage {
     /// Every label but 0, increasing, with its size, place and pieces.
     pub fn regions(&self) -> Vec<RegionReport> {
-        RegionReport::all(&self.grid, |at| self.labels[at])
+        RegionReport::of_labels(&self.grid, |at| self.labels[at])
     }
 
     /// The labels of the image without 0, increasing.

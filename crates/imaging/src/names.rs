@@ -85,8 +85,8 @@ impl LabelNames {
 
     /// The label name of the image most similar to a misspelt one.
     fn nearest(&self, name: &str, present: &[i32]) -> Option<String> {
-        let own = |&label: &i32| (label, self.get(label).map(str::to_owned));
-        let known: Labels = present.iter().map(own).collect();
+        let entry = |&label: &i32| (label, self.get(label).map(str::to_owned));
+        let known: Labels = present.iter().map(entry).collect();
         match known.find(&CellLabel::Name(name.to_owned())) {
             Err(UnknownLabel::Name { nearest, .. }) => nearest,
             _ => None,
@@ -96,8 +96,8 @@ impl LabelNames {
     /// The label of a name, in capitals or not.
     fn named(&self, name: &str, present: &[i32]) -> Result<i32, LabelError> {
         let of = |same: &dyn Fn(&str) -> bool| -> Vec<i32> {
-            let own = self.0.iter().filter(|(_, known)| same(known));
-            own.map(|(&label, _)| label).collect()
+            let matching = self.0.iter().filter(|(_, known)| same(known));
+            matching.map(|(&label, _)| label).collect()
         };
         let mut labels = of(&|known| known == name);
         if labels.is_empty() {
@@ -323,18 +323,18 @@ mod tests {
             let choices: Vec<LabelChoice> = typed.iter().map(|typed| typed.parse().unwrap()).collect();
             LabelChoice::resolve(&choices, &names, present)
         };
-        let all = [-3, 5, 7, 8, 9];
-        assert_eq!(choose(&["5-8", "left-kidney", "-3"], &all), Ok(vec![5, 7, 8, 9, -3]));
-        assert_eq!(choose(&["liver", "-5--1"], &all), Ok(vec![5, -3]));
+        let present = [-3, 5, 7, 8, 9];
+        assert_eq!(choose(&["5-8", "left-kidney", "-3"], &present), Ok(vec![5, 7, 8, 9, -3]));
+        assert_eq!(choose(&["liver", "-5--1"], &present), Ok(vec![5, -3]));
         assert_eq!(choose(&["tumour"], &[5, 8]), Ok(vec![8]));
-        assert!(matches!(choose(&["tumour"], &all), Err(LabelError::AmbiguousName { .. })));
-        assert!(matches!(choose(&["20-30"], &all), Err(LabelError::EmptyRange { .. })));
-        let message = choose(&["livr"], &all).unwrap_err().to_string();
+        assert!(matches!(choose(&["tumour"], &present), Err(LabelError::AmbiguousName { .. })));
+        assert!(matches!(choose(&["20-30"], &present), Err(LabelError::EmptyRange { .. })));
+        let message = choose(&["livr"], &present).unwrap_err().to_string();
         assert!(
             message.starts_with("no label is named `livr`; did you mean `Liver`? (the image has Liver (5)"),
             "{message}"
         );
-        let message = choose(&["spleen"], &all).unwrap_err().to_string();
+        let message = choose(&["spleen"], &present).unwrap_err().to_string();
         assert!(message.contains("no label is named `spleen`") && message.contains("Liver (5)"), "{message}");
     }
 

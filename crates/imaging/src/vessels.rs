@@ -36,20 +36,20 @@ impl Image {
             }
         };
         let of_voxel = |at: usize| {
-            let own = self.label(at);
-            if !vessels.contains(&own) {
-                return (own, None);
+            let voxel_label = self.label(at);
+            if !vessels.contains(&voxel_label) {
+                return (voxel_label, None);
             }
             let from = self.grid.triple(at);
             let mut found: Vec<i32> = (0..27).filter(|&way| way != 13).map(|way| behind(from, way)).collect();
             found.retain(|label| organ.contains(label));
             if found.len() < INSIDE {
-                return (own, Some(false));
+                return (voxel_label, Some(false));
             }
-            let count = |label: i32| found.iter().filter(|&&own| own == label).count();
+            let count = |label: i32| found.iter().filter(|&&neighbour| neighbour == label).count();
             // Among equals, the first label of the organ wins.
             let most = organ.iter().rev().max_by_key(|&&label| count(label));
-            (most.copied().unwrap_or(own), Some(true))
+            (most.copied().unwrap_or(voxel_label), Some(true))
         };
         let voxels: Vec<(i32, Option<bool>)> = (0..self.grid.len()).into_par_iter().map(of_voxel).collect();
         let sides =

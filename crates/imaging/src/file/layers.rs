@@ -45,8 +45,8 @@ pub(super) fn joined(
     notes: &mut Vec<String>,
 ) -> (Numbers, LabelNames) {
     let values: BTreeSet<i32> = segments.iter().map(|segment| segment.value).collect();
-    let own = values.len() == segments.len() && !values.contains(&0);
-    let label = |number: usize| if own { segments[number].value } else { number as i32 + 1 };
+    let distinct = values.len() == segments.len() && !values.contains(&0);
+    let label = |number: usize| if distinct { segments[number].value } else { number as i32 + 1 };
     let place: BTreeMap<(usize, i32), usize> = segments
         .iter()
         .enumerate()
@@ -69,7 +69,7 @@ pub(super) fn joined(
         shared += u64::from(count > 1);
         bytes.extend(last.map_or(0, label).to_le_bytes());
     }
-    if !own {
+    if !distinct {
         notes.push("several segments share a value: the labels are the segment numbers from 1".into());
     }
     if shared > 0 {

@@ -114,7 +114,7 @@ impl MetaImageHeader {
 
     fn dims(&self, rank: usize, options: &ReadOptions) -> Result<[usize; 3], Fault> {
         let field = self.need("DimSize")?;
-        let sizes: Vec<u64> = field.all("whole numbers are needed, one per axis")?;
+        let sizes: Vec<u64> = field.list("whole numbers are needed, one per axis")?;
         if sizes.len() != rank {
             return Err(field.bad("one whole number per axis is needed"));
         }
@@ -157,7 +157,7 @@ impl MetaImageHeader {
     fn grid(&self, rank: usize, dims: [usize; 3], notes: &mut Vec<String>) -> Result<Grid, Fault> {
         let numbers = |name: &str, count: usize| {
             let read = |field: &Field| {
-                let values: Vec<f64> = field.all("numbers are needed")?;
+                let values: Vec<f64> = field.list("numbers are needed")?;
                 if values.len() == count {
                     Ok(values)
                 } else {

@@ -168,7 +168,7 @@ impl NrrdHeader {
     /// The axes with a direction, or all if the file has none.
     fn axes(&self) -> Result<Axes, Fault> {
         let sizes_field = self.need("sizes")?;
-        let sizes: Vec<u64> = sizes_field.all("whole numbers are needed, one per axis")?;
+        let sizes: Vec<u64> = sizes_field.list("whole numbers are needed, one per axis")?;
         let rank: usize = self.need("dimension")?.one("a whole number is needed")?;
         if sizes.len() != rank || !(2..=16).contains(&rank) {
             return Err(sizes_field.bad("one size for each of 2 to 16 dimensions is needed"));
@@ -224,7 +224,7 @@ impl NrrdHeader {
         };
         let mut lengths = vec![1.0; rank];
         if let Some(field) = self.get("spacings") {
-            lengths = field.all("one number per axis is needed")?;
+            lengths = field.list("one number per axis is needed")?;
             if lengths.len() != rank || lengths.iter().take(3).any(|&h: &f64| h.is_nan() || h <= 0.0) {
                 return Err(field.bad("one positive number per axis is needed"));
             }
@@ -241,7 +241,7 @@ impl NrrdHeader {
             };
         }
         let Some(field) = self.get("axis mins") else { return Ok(Vector3::zeros()) };
-        let mins: Vec<f64> = field.all("one number per axis is needed")?;
+        let mins: Vec<f64> = field.list("one number per axis is needed")?;
         let of_axis = |&axis: &usize| mins.get(axis).copied().filter(|x| x.is_finite()).unwrap_or(0.0);
         Ok(Vector3::from_iterator(axes.kept.iter().map(of_axis)))
     }
@@ -329,10 +329,10 @@ impl NrrdHeader {
 fn vectors(field: &Field) -> Result<Vec<Option<Vector3>>, Fault> {
     const EXPECTED: &str = "vectors of three numbers are needed, like (1,0,0)";
     let mut rest = field.value.trim();
-    let mut all = Vec::new();
+    let mut vectors = Vec::new();
     while !rest.is_empty() {
         if let Some(after) = rest.strip_prefix("none") {
-            all.push(None);
+            vectors.push(None);
             rest = after.trim_start();
             continue;
         }
@@ -343,10 +343,10 @@ fn vectors(field: &Field) -> Result<Vec<Option<Vector3>>, Fault> {
             numbers.ok().and_then(|numbers| numbers.try_into().ok()).ok_or_else(|| field.bad(EXPECTED))?;
         // A vector of NaNs means `none`.
         let none = numbers.iter().all(|x| x.is_nan());
-        all.push((!none).then(|| numbers.into()));
+        vectors.push((!none).then(|| numbers.into()));
         rest = after.trim_start();
     }
-    Ok(all)
+    Ok(vectors)
 }
 
 /// Numbers as text, stored in the type of the header.

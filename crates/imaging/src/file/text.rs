@@ -22,12 +22,12 @@ impl Field {
 
     /// Exactly `N` values separated by spaces.
     pub fn array<T: FromStr + Copy, const N: usize>(&self, expected: &'static str) -> Result<[T; N], Fault> {
-        let values: Vec<T> = self.all(expected)?;
+        let values: Vec<T> = self.list(expected)?;
         values.try_into().map_err(|_| self.bad(expected))
     }
 
     /// Values separated by spaces.
-    pub fn all<T: FromStr>(&self, expected: &'static str) -> Result<Vec<T>, Fault> {
+    pub fn list<T: FromStr>(&self, expected: &'static str) -> Result<Vec<T>, Fault> {
         self.value.split_whitespace().map(|word| word.parse().map_err(|_| self.bad(expected))).collect()
     }
 

@@ -248,8 +248,8 @@ fn layers_of_segments_become_one_image() {
     };
     let labels = |image: &Image| image.labels().unwrap().labels;
     // Distinct values stay; the tumour, which comes later, lies in the liver.
-    let own = segment(1, 1, 7, "tumour") + &segment(0, 0, 5, "liver");
-    let image = layered("5 0  5 7  0 7  0 0", &own).unwrap();
+    let segments = segment(1, 1, 7, "tumour") + &segment(0, 0, 5, "liver");
+    let image = layered("5 0  5 7  0 7  0 0", &segments).unwrap();
     assert_eq!((image.grid.dims, labels(&image)), ([2, 2, 1], vec![5, 7, 7, 0]));
     assert_eq!((image.names.get(5), image.names.get(7)), (Some("liver"), Some("tumour")));
     assert_eq!(image.notes, ["segments overlap in 1 voxels, which belong to the later one"]);
@@ -261,7 +261,7 @@ fn layers_of_segments_become_one_image() {
     assert_eq!(image.names.get(3), Some("vein"));
     assert!(image.notes[0].contains("share a value") && image.notes[1].contains("overlap in 1"));
     // A number of no segment is background; a note counts it.
-    let image = layered("9 0  5 0  0 0  0 3", &own).unwrap();
+    let image = layered("9 0  5 0  0 0  0 3", &segments).unwrap();
     assert_eq!(labels(&image), [0, 5, 0, 0]);
     assert_eq!(image.notes, ["2 values belong to no segment and were ignored"]);
 }

@@ -48,7 +48,7 @@ impl Object {
             Some("1.2.840.10008.5.1.4.1.1.481.3") => Self::Contours,
             Some("1.2.840.10008.5.1.4.1.1.66.4" | "1.2.840.10008.5.1.4.1.1.66.7") => Self::Segmentation,
             _ if elements.get(PIXELS).is_none() => Self::Other,
-            _ => Self::Slices(Slice::all(elements, name, options)?),
+            _ => Self::Slices(Slice::of_file(elements, name, options)?),
         })
     }
 }
@@ -225,7 +225,7 @@ struct Slice {
 
 impl Slice {
     /// The slice of a file, or its frames, each as a slice.
-    fn all(elements: &Elements<'_>, name: &str, options: &ReadOptions) -> Result<Vec<Self>, Fault> {
+    fn of_file(elements: &Elements<'_>, name: &str, options: &ReadOptions) -> Result<Vec<Self>, Fault> {
         elements.require_plain()?;
         let frames = Frames::of(elements)?;
         let [columns, rows] = frames.size(options)?;
@@ -267,7 +267,7 @@ impl Slice {
 struct Frames<'a> {
     elements: &'a Elements<'a>,
     shared: Option<&'a Elements<'a>>,
-    own: &'a [Elements<'a>],
+    per_frame: &'a [Elements<'a>],
     count: usize,
 }
 
@@ -285,12 +285,12 @@ struct Placed {
 impl<'a> Frames<'a> {
     fn of(elements: &'a Elements<'a>) -> Result<Self, ImageProblem> {
         let count = elements.frames()?;
-        let own = elements.items(0x5200_9230);
-        if count > 1 && own.len() != count {
-            let what = format!("a file of {count} frames with the positions of {} frames", own.len());
+        let per_frame = elements.items(0x5200_9230);
+        if count > 1 && per_frame.len() != count {
+            let what = format!("a file of {count} frames with the positions of {} frames", per_frame.len());
             return Err(ImageProblem::Unsupported { what, remedy: EXPORT });
         }
-        Ok(Self { elements, shared: elements.items(0x5200_9229).first(), own, count })
+        Ok(Self { elements, shared: elements.items(0x5200_9229).first(), per_frame, count })
     }
 
     /// Columns and rows.
@@ -304,7 +304,7 @@ impl<'a> Frames<'a> {
     /// A functional group of a frame.
     fn group(&self, frame: usize, sequence: u32) -> Option<&'a Elements<'a>> {
         let in_item = |item: &'a Elements<'a>| item.items(sequence).first();
-        self.own.get(frame).and_then(in_item).or_else(|| self.shared.and_then(in_item))
+        self.per_frame.get(frame).and_then(in_item).or_else(|| self.shared.and_then(in_item))
     }
 
     fn place(&self, frame: usize) -> Result<Placed, ImageProblem> {
@@ -425,7 +425,7 @@ fn slice_step(slices: &[Slice], normal: &Vector3) -> Result<Vector3, ImageProble
     }
     let step = (last.position - first.position) / (slices.len() - 1) as f64;
     // A shift within the plane (tilted gantry) must be the same from slice to slice.
-    if let Some(at) = steps.iter().position(|own| (own - step).norm() > 0.1 * step.norm()) {
+    if let Some(at) = steps.iter().position(|between| (between - step).norm() > 0.1 * step.norm()) {
         return Err(ImageProblem::SliceDiffers {
             file: slices[at + 1].name.clone(),
             what: "a step of",

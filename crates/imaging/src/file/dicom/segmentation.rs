@@ -158,20 +158,20 @@ impl Stack {
         let mut sorted: Vec<(f64, usize)> = heights.iter().copied().zip(0..).collect();
         sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
         let ((low, first), (high, last)) = (sorted[0], sorted[sorted.len() - 1]);
-        let told = places[0].spacing;
+        let stated = places[0].spacing;
         // Frames of several segments lie at one height, to the round-off of decimal strings.
-        let same = 1e-3 * told.or(places[0].thickness).unwrap_or(1.0);
+        let same = 1e-3 * stated.or(places[0].thickness).unwrap_or(1.0);
         let gaps: Vec<f64> =
             sorted.windows(2).map(|pair| pair[1].0 - pair[0].0).filter(|&gap| gap > same).collect();
         let Some(least) = gaps.iter().copied().reduce(f64::min) else {
-            let spacing = told.or(places[0].thickness);
+            let spacing = stated.or(places[0].thickness);
             let spacing = spacing.ok_or(ImageProblem::MissingField { field: "SliceThickness" })?;
             let (step, slices) = (normal * spacing, vec![1; places.len()]);
             return Ok(Self { first: places[first].position - step, step, count: 3, slices });
         };
         let whole = |spacing: f64, gap: f64| (gap / spacing - (gap / spacing).round()).abs() < 0.05;
         let even = |&spacing: &f64| gaps.iter().all(|&gap| gap > 0.9 * spacing && whole(spacing, gap));
-        let spacing = told.filter(even).or(Some(least).filter(even)).ok_or_else(|| {
+        let spacing = stated.filter(even).or(Some(least).filter(even)).ok_or_else(|| {
             let odd = gaps.iter().copied().find(|&gap| !whole(least, gap)).unwrap_or(least);
             ImageProblem::SliceDiffers {
                 file: "a frame".to_owned(),
