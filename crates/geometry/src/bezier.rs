@@ -128,14 +128,14 @@ impl CurvedTriangle {
         let slope = |k: usize| {
             let corner = [0, 1, 2].map(|i| if i == k { 3.0 * w[i] * w[i] } else { 0.0 } - middle[k] / 6.0);
             let edge = EDGES.map(|[i, j]| {
-                let own = if k == i {
+                let direct = if k == i {
                     6.0 * w[i] * w[j]
                 } else if k == j {
                     3.0 * w[i] * w[i]
                 } else {
                     0.0
                 };
-                own + 0.25 * middle[k]
+                direct + 0.25 * middle[k]
             });
             (corner, edge)
         };

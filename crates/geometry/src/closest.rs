@@ -97,17 +97,17 @@ impl SurfaceLocator {
     }
 
     fn sort(&mut self, first: usize, end: usize) {
-        let own = &mut self.triangles[first..end];
-        let start = own[0].corners[0];
-        let corners = own.iter().flat_map(|triangle| &triangle.corners);
+        let triangles = &mut self.triangles[first..end];
+        let start = triangles[0].corners[0];
+        let corners = triangles.iter().flat_map(|triangle| &triangle.corners);
         let (low, high) = corners.fold((start, start), |(low, high), x| (low.inf(x), high.sup(x)));
         let number = self.parts.len();
         self.parts.push(Part { low, high, first: first as u32, end: end as u32, second: 0 });
-        if own.len() > FEW {
+        if triangles.len() > FEW {
             let axis = (high - low).imax();
             let centre = |triangle: &Triangle| triangle.corners.iter().map(|x| x[axis]).sum::<f64>();
-            let middle = own.len() / 2;
-            own.select_nth_unstable_by(middle, |a, b| {
+            let middle = triangles.len() / 2;
+            triangles.select_nth_unstable_by(middle, |a, b| {
                 centre(a).total_cmp(&centre(b)).then(a.face.cmp(&b.face))
             });
             self.sort(first, first + middle);
@@ -207,8 +207,8 @@ mod tests {
     fn faces_that_look_the_other_way_do_not_count() {
         let mesh = block_of_tets([4, 4, 4]);
         let surface = boundary(&mesh);
-        let all: Vec<u32> = (0..surface.faces.len() as u32).collect();
-        let locator = SurfaceLocator::new(&surface, &all, &mesh.points);
+        let faces: Vec<u32> = (0..surface.faces.len() as u32).collect();
+        let locator = SurfaceLocator::new(&surface, &faces, &mesh.points);
         let over = Vector3::new(1.3, 2.1, 4.5);
         let found = |facing: Vector3, within: f64| {
             locator.closest_facing(&over, &facing, 0.0, within).map(|at| at.position)

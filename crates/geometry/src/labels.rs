@@ -123,12 +123,12 @@ impl Labels {
     /// Adds the labels of another mesh. A label with different names keeps both.
     pub fn join(&mut self, other: Self) {
         for (label, name) in other.0 {
-            let own = self.0.entry(label).or_default();
-            match (own.as_mut(), name) {
-                (Some(own), Some(name)) if !own.split(", ").any(|known| known == name) => {
-                    own.push_str(&format!(", {name}"));
+            let names = self.0.entry(label).or_default();
+            match (names.as_mut(), name) {
+                (Some(names), Some(name)) if !names.split(", ").any(|known| known == name) => {
+                    names.push_str(&format!(", {name}"));
                 }
-                (None, name) => *own = name,
+                (None, name) => *names = name,
                 _ => {}
             }
         }
@@ -272,10 +272,10 @@ mod tests {
     fn an_unknown_label_comes_with_those_there_are() {
         let labels = named(&[(5, "liver"), (7, "vein"), (8, "vein")]);
         let message = find(&labels, "livr").unwrap_err();
-        let all = "the mesh has -2, 5 (liver), 7 (vein), 8 (vein)";
-        assert_eq!(message, format!("no label is named `livr`; did you mean `liver`? ({all})"));
-        assert_eq!(find(&labels, "6").unwrap_err(), format!("no cell has label 6: {all}"));
-        assert_eq!(find(&labels, "20-30").unwrap_err(), format!("no cell has label 20-30: {all}"));
+        let listing = "the mesh has -2, 5 (liver), 7 (vein), 8 (vein)";
+        assert_eq!(message, format!("no label is named `livr`; did you mean `liver`? ({listing})"));
+        assert_eq!(find(&labels, "6").unwrap_err(), format!("no cell has label 6: {listing}"));
+        assert_eq!(find(&labels, "20-30").unwrap_err(), format!("no cell has label 20-30: {listing}"));
         assert!(find(&labels, "vein").unwrap_err().contains("the labels 7, 8; choose by number"));
         let none = find(&Labels::default(), "liver").unwrap_err();
         assert!(none.ends_with("the mesh has no cell data named `label`"), "{none}");

@@ -270,7 +270,7 @@ impl Mesh {
         for &[first, second] in pairs {
             target[second as usize] = target[first as usize];
         }
-        let kept: Vec<bool> = target.iter().zip(0..).map(|(&target, own)| target == own).collect();
+        let kept: Vec<bool> = target.iter().zip(0..).map(|(&target, node)| target == node).collect();
         self.renumber(&target, &kept)
     }
 

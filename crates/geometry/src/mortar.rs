@@ -89,7 +89,8 @@ pub fn mortar_rows(
         let reach = reach.max(0.5 * (high - low).norm());
         let slack = Vector3::repeat(reach);
         let around = AABB::from_corners((low - slack).into(), (high + slack).into());
-        let mut near: Vec<usize> = tree.locate_in_envelope_intersecting(around).map(|own| own.data).collect();
+        let mut near: Vec<usize> =
+            tree.locate_in_envelope_intersecting(around).map(|entry| entry.data).collect();
         near.sort_unstable();
         let Some(plane) = Plane::of(face, follower.points) else { continue };
         let mine = plane.face(face, follower.points);
@@ -109,17 +110,17 @@ pub fn mortar_rows(
             continue;
         };
         for (index, sample) in
-            segments.iter().flat_map(|(index, all)| all.iter().map(move |own| (index, own)))
+            segments.iter().flat_map(|(index, samples)| samples.iter().map(move |sample| (index, sample)))
         {
             for (row, &a) in multipliers.iter().enumerate() {
-                let psi: f64 = (0..nodes.len()).map(|b| dual[(row, b)] * sample.own[b]).sum();
+                let psi: f64 = (0..nodes.len()).map(|b| dual[(row, b)] * sample.follower[b]).sum();
                 let sums = sums.entry(nodes[a]).or_default();
-                sums.diagonal += sample.weight * sample.own[a];
+                sums.diagonal += sample.weight * sample.follower[a];
                 for (&node, n) in other.faces[*index].nodes().iter().zip(sample.other) {
                     *sums.followed.entry(node).or_default() += sample.weight * psi * n;
                 }
                 for (b, &node) in nodes.iter().enumerate().filter(|(b, _)| !multipliers.contains(b)) {
-                    *sums.own.entry(node).or_default() -= sample.weight * psi * sample.own[b];
+                    *sums.untied.entry(node).or_default() -= sample.weight * psi * sample.follower[b];
                 }
             }
         }
@@ -133,21 +134,21 @@ pub fn mortar_rows(
 struct Sums {
     diagonal: f64,
     followed: BTreeMap<u32, f64>,
-    own: BTreeMap<u32, f64>,
+    untied: BTreeMap<u32, f64>,
 }
 
 impl Sums {
     fn row(self, node: u32, own_points: &[Vector3], points: &[Vector3]) -> MortarRow {
-        let over = |all: BTreeMap<u32, f64>| -> Vec<(u32, f64)> {
-            let weights = all.into_iter().map(|(node, sum)| (node, sum / self.diagonal));
+        let over = |sums: BTreeMap<u32, f64>| -> Vec<(u32, f64)> {
+            let weights = sums.into_iter().map(|(node, sum)| (node, sum / self.diagonal));
             weights.filter(|(_, weight)| weight.abs() > TINY).collect()
         };
-        let (followed, own) = (over(self.followed), over(self.own));
-        let reached = |all: &[(u32, f64)], points: &[Vector3]| -> Vector3 {
-            all.iter().map(|&(node, weight)| points[node as usize] * weight).sum()
+        let (followed, untied) = (over(self.followed), over(self.untied));
+        let reached = |weights: &[(u32, f64)], points: &[Vector3]| -> Vector3 {
+            weights.iter().map(|&(node, weight)| points[node as usize] * weight).sum()
         };
-        let offset = own_points[node as usize] - reached(&followed, points) - reached(&own, own_points);
-        MortarRow { node, followed, own, offset }
+        let offset = own_points[node as usize] - reached(&followed, points) - reached(&untied, own_points);
+        MortarRow { node, followed, own: untied, offset }
     }
 }
 
@@ -158,19 +159,20 @@ fn dual_functions(segments: &[(usize, Vec<Sample>)], nodes: usize, tied: &[usize
     let mut mass = DMatrix::zeros(nodes, nodes);
     for sample in segments.iter().flat_map(|(_, samples)| samples) {
         for (a, b) in (0..nodes).flat_map(|a| (0..nodes).map(move |b| (a, b))) {
-            mass[(a, b)] += sample.weight * sample.own[a] * sample.own[b];
+            mass[(a, b)] += sample.weight * sample.follower[a] * sample.follower[b];
         }
     }
     if tied.is_empty() || segments.is_empty() {
         return None;
     }
     let share = 1.0 / tied.len() as f64;
-    let shared = DMatrix::from_fn(tied.len(), nodes, |row, b| match tied.iter().position(|&own| own == b) {
-        Some(own) => f64::from(u8::from(own == row)),
-        None => share,
-    });
-    let all = &shared * &mass;
-    let gram = DMatrix::from_fn(tied.len(), tied.len(), |row, column| all[(row, tied[column])]);
+    let shared =
+        DMatrix::from_fn(tied.len(), nodes, |row, b| match tied.iter().position(|&corner| corner == b) {
+            Some(at) => f64::from(u8::from(at == row)),
+            None => share,
+        });
+    let products = &shared * &mass;
+    let gram = DMatrix::from_fn(tied.len(), tied.len(), |row, column| products[(row, tied[column])]);
     let diagonal = DMatrix::from_diagonal(&gram.row_sum().transpose());
     Some(diagonal * gram.try_inverse()? * shared)
 }
@@ -180,7 +182,7 @@ struct Sample {
     /// Its part of the area [m²].
     weight: f64,
     /// Shape functions of the follower's face and of the other one.
-    own: [f64; 4],
+    follower: [f64; 4],
     other: [f64; 4],
 }
 
@@ -246,8 +248,8 @@ impl Projected {
             let double = u.perp(&v).abs();
             for &([s, t], weight) in &rule {
                 let at = centre + u * s + v * t;
-                let (own, other) = (self.shape_functions(&at)?, other.shape_functions(&at)?);
-                samples.push(Sample { weight: weight * double, own, other });
+                let (follower, other) = (self.shape_functions(&at)?, other.shape_functions(&at)?);
+                samples.push(Sample { weight: weight * double, follower, other });
             }
         }
         Some(samples)
@@ -366,8 +368,8 @@ fn gauss_rule(n: usize) -> Vec<(f64, f64)> {
 
 fn bounds(face: &Face, points: &[Vector3]) -> (Vector3, Vector3) {
     let first = points[face.nodes()[0] as usize];
-    let all = face.nodes().iter().map(|&node| points[node as usize]);
-    all.fold((first, first), |(low, high), x| (low.inf(&x), high.sup(&x)))
+    let corners = face.nodes().iter().map(|&node| points[node as usize]);
+    corners.fold((first, first), |(low, high), x| (low.inf(&x), high.sup(&x)))
 }
 
 #[cfg(test)]
@@ -407,10 +409,10 @@ mod tests {
         let mut areas = vec![0.0; mesh.points.len()];
         for face in faces {
             let plane = Plane::of(face, &mesh.points).unwrap();
-            let own = plane.face(face, &mesh.points);
-            let samples = own.segment(&plane.face(face, &mesh.points), 1.0).unwrap();
+            let projected = plane.face(face, &mesh.points);
+            let samples = projected.segment(&plane.face(face, &mesh.points), 1.0).unwrap();
             for (a, &node) in face.nodes().iter().enumerate() {
-                areas[node as usize] += samples.iter().map(|s| s.weight * s.own[a]).sum::<f64>();
+                areas[node as usize] += samples.iter().map(|s| s.weight * s.follower[a]).sum::<f64>();
             }
         }
         areas
@@ -492,12 +494,12 @@ mod tests {
     /// ∫ N_a over the part of the faces that lies on the others [m²].
     fn common_area_of(node: u32, mine: &[Face], below: &Mesh, yours: &[Face], above: &Mesh) -> f64 {
         let of_face = |face: &Face| {
-            let Some(a) = face.nodes().iter().position(|&own| own == node) else { return 0.0 };
+            let Some(a) = face.nodes().iter().position(|&corner| corner == node) else { return 0.0 };
             let plane = Plane::of(face, &below.points).unwrap();
-            let own = plane.face(face, &below.points);
+            let projected = plane.face(face, &below.points);
             let segments =
-                yours.iter().filter_map(|other| own.segment(&plane.face(other, &above.points), 1.0));
-            segments.flatten().map(|sample| sample.weight * sample.own[a]).sum()
+                yours.iter().filter_map(|other| projected.segment(&plane.face(other, &above.points), 1.0));
+            segments.flatten().map(|sample| sample.weight * sample.follower[a]).sum()
         };
         mine.iter().map(of_face).sum()
     }

@@ -31,8 +31,8 @@ pub fn patch(
     weights: [f64; 3],
     radius: Option<f64>,
 ) -> Vec<(u32, f64)> {
-    let own = || corners.into_iter().zip(weights).filter(|(_, weight)| *weight != 0.0);
-    let middle: Vector3 = own().map(|(corner, weight)| points[corner as usize] * weight).sum();
+    let corner_weights = || corners.into_iter().zip(weights).filter(|(_, weight)| *weight != 0.0);
+    let middle: Vector3 = corner_weights().map(|(corner, weight)| points[corner as usize] * weight).sum();
     let radius = radius.unwrap_or_else(|| {
         let [a, b, c] = corners.map(|corner| points[corner as usize]);
         REACH * ((a - b).norm() + (b - c).norm() + (c - a).norm()) / 3.0
@@ -62,7 +62,7 @@ pub fn patch(
     };
     let sum: f64 = reached.iter().map(|&point| weight(point)).sum();
     if sum == 0.0 {
-        return own().collect();
+        return corner_weights().collect();
     }
     reached.into_iter().map(|point| (point, weight(point) / sum)).collect()
 }

@@ -19,8 +19,8 @@ impl Region {
     /// True if a cell with these marks is in it.
     pub fn has(self, label: Option<i32>, body: i32) -> bool {
         match self {
-            Self::Label(own) => label == Some(own),
-            Self::Body(own) => body == own,
+            Self::Label(wanted) => label == Some(wanted),
+            Self::Body(wanted) => body == wanted,
         }
     }
 }
@@ -56,7 +56,7 @@ impl RegionNames {
             Err(unknown) => unknown,
         };
         let CellLabel::Name(name) = name else { return Err(unknown) };
-        let named = self.bodies.iter().filter(|(_, own)| *own == name);
+        let named = self.bodies.iter().filter(|(_, known)| *known == name);
         let found: Vec<Region> = named.map(|(&body, _)| Region::Body(body)).collect();
         match unknown {
             _ if !found.is_empty() => Ok(found),

@@ -202,11 +202,11 @@ pub enum SelectionError {
 }
 
 fn sets_instead(nearest: &Option<String>, known: &[String]) -> String {
-    let all = format!("the mesh has `{}`", known.join("`, `"));
+    let listing = format!("the mesh has `{}`", known.join("`, `"));
     match nearest {
         _ if known.is_empty() => ": the mesh has no sets".to_owned(),
-        Some(name) => format!("; did you mean `{name}`? ({all})"),
-        None => format!(": {all}"),
+        Some(name) => format!("; did you mean `{name}`? ({listing})"),
+        None => format!(": {listing}"),
     }
 }
 

@@ -62,8 +62,8 @@ pub struct SplitCells {
 
 /// Adds cells to a mesh as tets. Returns a sentence on the cells that were split; `None` without any.
 pub fn add_as_tets(mesh: &mut Mesh, cells: &[SplitCells]) -> Option<String> {
-    let own = |cells: &SplitCells| cells.nodes.len() / cells.kind.node_count();
-    if cells.iter().all(|cells| own(cells) == 0) {
+    let cell_count = |cells: &SplitCells| cells.nodes.len() / cells.kind.node_count();
+    if cells.iter().all(|cells| cell_count(cells) == 0) {
         return None;
     }
     let mut splitter = Splitter::new(mesh, cells);
@@ -75,7 +75,7 @@ pub fn add_as_tets(mesh: &mut Mesh, cells: &[SplitCells]) -> Option<String> {
         }
     };
     for cells in cells {
-        count(own(cells), cells.kind.name());
+        count(cell_count(cells), cells.kind.name());
     }
     match hexes.len() {
         0 => {}
@@ -216,9 +216,9 @@ impl Splitter {
         from.sort_unstable();
         // All triangles of the faces at a node have it: the cone from it cuts these faces as they are.
         let starts = |node: &&u32| {
-            halves.iter().all(|own| {
-                let with = own.iter().filter(|triangle| triangle.contains(*node)).count();
-                with == 0 || with == own.len()
+            halves.iter().all(|triangles| {
+                let with = triangles.iter().filter(|triangle| triangle.contains(*node)).count();
+                with == 0 || with == triangles.len()
             })
         };
         let apex = from.iter().find(starts).copied().unwrap_or_else(|| {
@@ -249,9 +249,9 @@ impl Splitter {
 
 /// Key of a face, equal for all faces of the same nodes.
 fn key(nodes: &[u32], face: &[usize]) -> [u32; 4] {
-    let mut own = [0; 4];
-    own.iter_mut().zip(face).for_each(|(own, &at)| *own = nodes[at]);
-    face_key(&own[..face.len()])
+    let mut chosen = [0; 4];
+    chosen.iter_mut().zip(face).for_each(|(slot, &at)| *slot = nodes[at]);
+    face_key(&chosen[..face.len()])
 }
 
 /// A new point at the centre of some points, with the mean of their data.
@@ -285,13 +285,13 @@ fn add(
         .collect();
     block.nodes.extend(pieces.iter().flatten().flatten());
     for (name, array) in data {
-        let own = block.data.entry(name.clone()).or_insert_with(|| DataArray {
+        let target = block.data.entry(name.clone()).or_insert_with(|| DataArray {
             components: array.components,
             values: vec![f64::NAN; before * array.components],
         });
-        if own.components == array.components {
+        if target.components == array.components {
             for (cell, piece) in pieces.iter().enumerate() {
-                piece.iter().for_each(|_| own.values.extend(array.item(cell)));
+                piece.iter().for_each(|_| target.values.extend(array.item(cell)));
             }
         }
     }

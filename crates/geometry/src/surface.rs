@@ -85,16 +85,16 @@ pub(crate) struct FaceGroups(Vec<([u32; 4], Face)>);
 
 impl FaceGroups {
     pub(crate) fn new(mesh: &Mesh) -> Self {
-        let mut all = Vec::new();
+        let mut keyed = Vec::new();
         for block in mesh.volume_blocks() {
             for (parent, nodes) in valid_cells(mesh, block) {
                 let faces = faces(block.kind).iter();
                 let faces = faces.filter_map(|face| Face::new(parent, face.iter().map(|&a| nodes[a])));
-                all.extend(faces.map(|face| (face.key(), face)));
+                keyed.extend(faces.map(|face| (face.key(), face)));
             }
         }
-        all.sort_unstable_by_key(|(key, face)| (*key, face.parent, face.corners));
-        Self(all)
+        keyed.sort_unstable_by_key(|(key, face)| (*key, face.parent, face.corners));
+        Self(keyed)
     }
 
     pub(crate) fn iter(&self) -> impl Iterator<Item = &[([u32; 4], Face)]> {
@@ -187,14 +187,14 @@ impl Surface {
     /// returns the original index in `points` of each of its points.
     pub fn to_mesh(&self, points: &[Vector3]) -> (Mesh, Vec<u32>) {
         let parents = self.nodes();
-        let mut own = vec![0; points.len()];
+        let mut numbers = vec![0; points.len()];
         for (at, &parent) in parents.iter().enumerate() {
-            own[parent as usize] = at as u32;
+            numbers[parent as usize] = at as u32;
         }
         let points = parents.iter().map(|&parent| points[parent as usize]).collect();
         let mut mesh = Mesh { points, ..Mesh::default() };
         for face in &self.faces {
-            mesh.block_mut(face.kind).nodes.extend(face.nodes().iter().map(|&node| own[node as usize]));
+            mesh.block_mut(face.kind).nodes.extend(face.nodes().iter().map(|&node| numbers[node as usize]));
         }
         mesh.blocks.sort_by_key(|block| block.kind);
         (mesh, parents)
@@ -319,14 +319,14 @@ mod tests {
     fn surface_becomes_a_mesh_of_its_own() {
         let mesh = block_of_hexes([2, 2, 2]);
         let surface = boundary(&mesh);
-        let (own, parents) = surface.to_mesh(&mesh.points);
-        assert_eq!(own.points.len(), 26);
+        let (surface_mesh, parents) = surface.to_mesh(&mesh.points);
+        assert_eq!(surface_mesh.points.len(), 26);
         assert!(!parents.contains(&13));
-        for (point, &parent) in own.points.iter().zip(&parents) {
+        for (point, &parent) in surface_mesh.points.iter().zip(&parents) {
             assert_eq!(*point, mesh.points[parent as usize]);
         }
-        let again = boundary(&own);
-        assert_eq!(again.area(&own.points), surface.area(&mesh.points));
+        let again = boundary(&surface_mesh);
+        assert_eq!(again.area(&surface_mesh.points), surface.area(&mesh.points));
     }
 
     #[test]

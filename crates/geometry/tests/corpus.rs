@@ -41,7 +41,7 @@ fn broken_meshes_give_errors_in_little_memory() {
         assert!(matches!(error, Err(MeshFileError::Content { .. })), "{name}: {error:?}");
     }
     for format in Format::ALL {
-        let count = corpus.iter().filter(|(_, own, _)| own == format).count();
+        let count = corpus.iter().filter(|(_, of_file, _)| of_file == format).count();
         assert!(count >= 3, "{}: {count}", format.name());
     }
     let mut noise = Random::new(20_260_101);
@@ -81,7 +81,7 @@ fn write_the_corpus() {
         let ending = format.extension();
         save(&format!("{ending}-empty"), b"");
         let data = files("data");
-        if let Some((_, _, bytes)) = data.iter().find(|(_, own, _)| own == format) {
+        if let Some((_, _, bytes)) = data.iter().find(|(_, of_file, _)| of_file == format) {
             save(&format!("{ending}-cut"), &bytes[..bytes.len() / 3]);
         }
     }

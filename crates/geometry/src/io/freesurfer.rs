@@ -97,8 +97,8 @@ fn read_text(bytes: &[u8]) -> Result<MeshFile, Fault> {
 
 fn push(cells: &mut Cells, corners: &[i64], points: usize, number: usize, place: Place) -> Result<(), Fault> {
     let mut nodes = [0; 3];
-    for (own, &corner) in nodes.iter_mut().zip(corners) {
-        *own = node(corner, points, place, || format!("triangle {number}"))?;
+    for (slot, &corner) in nodes.iter_mut().zip(corners) {
+        *slot = node(corner, points, place, || format!("triangle {number}"))?;
     }
     cells.open();
     cells.push(CellKind::Triangle, &nodes);

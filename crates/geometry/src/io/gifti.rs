@@ -52,8 +52,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
     if let Some((corners, place)) = &corners {
         for (number, corners) in corners.chunks_exact(3).enumerate() {
             let mut nodes = [0; 3];
-            for (own, &corner) in nodes.iter_mut().zip(corners) {
-                *own = node(corner as i64, points.len(), *place, || format!("triangle {number}"))?;
+            for (slot, &corner) in nodes.iter_mut().zip(corners) {
+                *slot = node(corner as i64, points.len(), *place, || format!("triangle {number}"))?;
             }
             cells.open();
             cells.push(CellKind::Triangle, &nodes);

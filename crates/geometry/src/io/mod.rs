@@ -121,9 +121,9 @@ impl Format {
     /// The format that the ending of a path names, in capitals or not.
     pub fn of_path(path: &Path) -> Option<Self> {
         let extension = path.extension().and_then(OsStr::to_str)?;
-        let own = |format: &Self| extension.eq_ignore_ascii_case(format.extension());
+        let by_extension = |format: &Self| extension.eq_ignore_ascii_case(format.extension());
         let surface = || freesurfer::NAMES.contains(&extension).then_some(Self::FreeSurfer);
-        Self::ALL.iter().copied().find(own).or_else(surface)
+        Self::ALL.iter().copied().find(by_extension).or_else(surface)
     }
 
     /// Returns the format that the ending of a path names, or else the format of the first bytes of the file.

@@ -477,14 +477,14 @@ fn surfaces_of_3d_slicer_have_the_axes_of_images() {
     let v = "v -1 -2 3\nv -4 -2 3\nv -4 -5 3\nf 1 2 3\n";
     let ply = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n\
                property list uchar int vertex_index\nend_header\n";
-    let all = [
+    let files = [
         (Format::Stl, format!("solid {lps}\n{facets}endsolid\n")),
         (Format::Obj, format!("# {lps}\n{v}")),
         (Format::Ply, format!("ply\nformat ascii 1.0\ncomment {lps}\n{ply}{triangle}3 0 1 2\n")),
         (Format::Vtk, format!("# vtk DataFile Version 3.0\n{lps}\nASCII\nDATASET POLYDATA\n{off}")),
         (Format::Vtp, vtp("LPS")),
     ];
-    for (format, content) in all {
+    for (format, content) in files {
         let file = text(&content, format);
         let expected = points(&[[1.0, 2.0, 3.0], [4.0, 2.0, 3.0], [4.0, 5.0, 3.0]]);
         assert_eq!(file.mesh.points, expected, "{format:?}");
