@@ -78,11 +78,11 @@ pub(super) fn read(
     }
     let surface = boundary(&geometry.mesh);
     let mut reader = ConditionReader { geometry, surface, remarks };
-    let mut all = Vec::new();
+    let mut conditions = Vec::new();
     for constraint in children(of, "Constraint") {
-        all.extend(reader.constraint(constraint)?);
+        conditions.extend(reader.constraint(constraint)?);
     }
-    Ok(all)
+    Ok(conditions)
 }
 
 struct ConditionReader<'r> {
@@ -318,13 +318,13 @@ impl ConditionReader<'_> {
 
     /// The nodes of the faces of a constraint, in their order.
     fn listed_faces(&mut self, of: XmlElement<'_>) -> Result<Vec<Vec<u32>>, Fault> {
-        let all = |faces: &mut dyn Iterator<Item = usize>| -> Vec<Vec<u32>> {
+        let nodes_of = |faces: &mut dyn Iterator<Item = usize>| -> Vec<Vec<u32>> {
             faces.map(|face| self.surface.faces[face].nodes().to_vec()).collect()
         };
         if of.attribute("SpecType").map(str::trim) == Some("NORMAL") {
             let chosen = self.normal(of)?.faces(&self.geometry.mesh, &self.surface);
             let chosen = chosen.map_err(|error| fault(of, ImportProblem::Selection(Box::new(error))))?;
-            let faces = all(&mut chosen.iter().map(|&face| face as usize));
+            let faces = nodes_of(&mut chosen.iter().map(|&face| face as usize));
             if child(of, "RestrictTo").is_some() {
                 let note = format!(
                     "line {}: NiftySim restricts nodes only, not faces: <RestrictTo> ignored",
@@ -335,7 +335,7 @@ impl ConditionReader<'_> {
             return Ok(faces);
         }
         let size = match attribute(of, "NumFaces", "NumFaces=\"all\" or a number")? {
-            "all" => return Ok(all(&mut (0..self.surface.faces.len()))),
+            "all" => return Ok(nodes_of(&mut (0..self.surface.faces.len()))),
             word => count(of, word)?,
         };
         let corners = match attribute(of, "FaceType", "FaceType=\"Tri\" or \"Quad\"")? {
@@ -469,21 +469,22 @@ fn gathered(conditions: Vec<Condition>) -> Vec<Condition> {
             _ => None,
         }
     }
-    let mut all: Vec<Condition> = Vec::new();
+    let mut joined: Vec<Condition> = Vec::new();
     for condition in conditions {
         let same = |last: &&mut Condition| {
-            let (Some((_, own)), Some((_, other))) = (vector(&condition.action), vector(&last.action)) else {
+            let (Some((_, along)), Some((_, other))) = (vector(&condition.action), vector(&last.action))
+            else {
                 return false;
             };
-            (last.line, last.shape, other) == (condition.line, condition.shape, own)
+            (last.line, last.shape, other) == (condition.line, condition.shape, along)
                 && std::mem::discriminant(&last.action) == std::mem::discriminant(&condition.action)
         };
         let Some((value, _)) = vector(&condition.action) else {
-            all.push(condition);
+            joined.push(condition);
             continue;
         };
-        let Some(last) = all.last_mut().filter(same) else {
-            all.push(condition);
+        let Some(last) = joined.last_mut().filter(same) else {
+            joined.push(condition);
             continue;
         };
         if last.values.is_empty() {
@@ -492,13 +493,13 @@ fn gathered(conditions: Vec<Condition>) -> Vec<Condition> {
         last.values.resize(last.values.len() + condition.nodes.len(), value);
         last.nodes.extend(condition.nodes);
     }
-    for condition in all.iter_mut().filter(|condition| !condition.values.is_empty()) {
+    for condition in joined.iter_mut().filter(|condition| !condition.values.is_empty()) {
         let mut pairs: Vec<_> =
             condition.nodes.iter().copied().zip(condition.values.iter().copied()).collect();
         pairs.sort_by_key(|(node, _)| *node);
         (condition.nodes, condition.values) = pairs.into_iter().unzip();
     }
-    all
+    joined
 }
 
 /// A condition without the components that are displaced, if it holds any.

@@ -163,8 +163,8 @@ fn from_file(of: XmlElement<'_>, files: &Files<'_>, notes: &mut Vec<String>) -> 
     }
     let file = files.mesh(&name).map_err(|error| fault(of, ImportProblem::Mesh(Box::new(error))))?;
     // Labels are not taken over: materials go by <ElementSet>.
-    let told = file.notes.iter().filter(|note| !note.contains("`label`"));
-    notes.extend(told.map(|note| format!("{name}: {note}")));
+    let kept = file.notes.iter().filter(|note| !note.contains("`label`"));
+    notes.extend(kept.map(|note| format!("{name}: {note}")));
     let cells = file.mesh.block(solid.cell()).map(|block| block.nodes.clone()).unwrap_or_default();
     let mut geometry = Geometry::new(solid, file.mesh.points, cells);
     place(of, &mut geometry.mesh.points)?;

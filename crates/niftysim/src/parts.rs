@@ -128,8 +128,8 @@ impl Model {
         sets.read(root, self)?;
         let (material, density) = sets.finish(root)?;
         let (mut conditions, mut membranes) = (Vec::new(), Vec::new());
-        for ((own, walls), map) in apart.into_iter().zip(&maps) {
-            conditions.extend(own.into_iter().map(|condition| renumbered(condition, map)));
+        for ((of_part, walls), map) in apart.into_iter().zip(&maps) {
+            conditions.extend(of_part.into_iter().map(|condition| renumbered(condition, map)));
             membranes.extend(walls.into_iter().map(|membrane: Membrane| Membrane {
                 faces: renumbered_faces(&membrane.faces, map),
                 ..membrane
@@ -260,8 +260,8 @@ impl Sets {
                 }
             };
             let of = needed(set, "Material", "<Material Type=\"NH\">…</Material>")?;
-            let (material, own) = Material::read(of)?;
-            let density = match own.or(model.system.density) {
+            let (material, stated) = Material::read(of)?;
+            let density = match stated.or(model.system.density) {
                 Some(density) => density,
                 None => {
                     let (wanted, example) = ("Density", "<Density>1000</Density> here or in <SystemParams>");

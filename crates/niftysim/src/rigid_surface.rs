@@ -137,10 +137,10 @@ impl RigidSurface {
             point - normal * depth
         });
         let behind: Vec<Vector3> = behind.collect();
-        let mut all = triangles.clone();
-        all.extend(triangles.iter().map(|&[a, b, c]| [a + back, c + back, b + back]));
-        all.extend(rim.iter().flat_map(|&[a, b]| [[b, a, a + back], [b, a + back, b + back]]));
-        Ok((mesh([points, behind].concat(), &all), false, Some(depth)))
+        let mut closed = triangles.clone();
+        closed.extend(triangles.iter().map(|&[a, b, c]| [a + back, c + back, b + back]));
+        closed.extend(rim.iter().flat_map(|&[a, b]| [[b, a, a + back], [b, a + back, b + back]]));
+        Ok((mesh([points, behind].concat(), &closed), false, Some(depth)))
     }
 
     /// Joins points at one place, and drops triangles without area.

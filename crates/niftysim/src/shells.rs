@@ -83,7 +83,7 @@ pub(super) fn read(
     }
     let triangles = triangles(elements, kind, geometry)?;
     let mut taken = vec![false; triangles.len()];
-    let mut all = Vec::new();
+    let mut membranes = Vec::new();
     for set in children(of, "ShellElementSet") {
         let members = members(set, triangles.len())?;
         if kind == "SURFACE" && members.len() < triangles.len() {
@@ -109,9 +109,9 @@ pub(super) fn read(
             ));
         }
         membrane.faces = members.iter().map(|&member| triangles[member as usize].clone()).collect();
-        all.push(membrane);
+        membranes.push(membrane);
     }
-    Ok(all)
+    Ok(membranes)
 }
 
 /// The triangles of elements of a type, by their nodes.
@@ -130,14 +130,14 @@ fn triangles(of: XmlElement<'_>, kind: &str, geometry: &Geometry) -> Result<Vec<
     }
 }
 
-/// Reads the elements of a set, out of `all`.
-fn members(set: XmlElement<'_>, all: usize) -> Result<Vec<u32>, Fault> {
+/// Reads the elements of a set, out of `element_count`.
+fn members(set: XmlElement<'_>, element_count: usize) -> Result<Vec<u32>, Fault> {
     match attribute(set, "Size", "Size=\"all\" or a number")? {
-        "all" => Ok((0..all as u32).collect()),
+        "all" => Ok((0..element_count as u32).collect()),
         word => {
             let size = count(set, word)?;
-            let listed = indices(set, "shell element", all)?;
-            run_of_indices(set, listed, size, "shell element", "shell elements", all)
+            let listed = indices(set, "shell element", element_count)?;
+            run_of_indices(set, listed, size, "shell element", "shell elements", element_count)
         }
     }
 }

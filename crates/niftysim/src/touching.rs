@@ -59,32 +59,32 @@ impl Touching {
             let set = if self.several { format!("{name}-{body}") } else { name.clone() };
             let mut lines = format!("[contact.{set}]\nbetween = [\"{body}\", \"{name}\"]\n");
             if let Some(nodes) = &thing.nodes {
-                let own: BTreeSet<u32> =
+                let listed: BTreeSet<u32> =
                     outer.iter().copied().filter(|node| nodes.contains(&(node + first))).collect();
-                if own.is_empty() {
+                if listed.is_empty() {
                     continue;
                 }
                 *met = true;
                 let chosen = surface.faces.iter().map(|face| face.nodes());
-                let chosen = chosen.filter(|face| face.iter().all(|node| own.contains(node)));
+                let chosen = chosen.filter(|face| face.iter().all(|node| listed.contains(node)));
                 let chosen: Vec<Vec<u32>> = chosen.map(<[u32]>::to_vec).collect();
                 let covered: BTreeSet<u32> = chosen.iter().flatten().copied().collect();
                 if chosen.is_empty() {
-                    let (line, own) = (thing.line, own.len());
+                    let (line, listed_count) = (thing.line, listed.len());
                     writer.missing.push(format!(
-                        "contact (the object of line {line} with `{body}`: no face has all its nodes among the {own} \
+                        "contact (the object of line {line} with `{body}`: no face has all its nodes among the {listed_count} \
                          listed nodes; list all nodes of each face)"
                     ));
                     continue;
                 }
-                if covered.len() < own.len() {
+                if covered.len() < listed.len() {
                     writer.notes.push(format!(
                         "`{set}`: only whole faces touch, but {} of {} listed nodes are on no face whose nodes are all listed",
-                        own.len() - covered.len(),
-                        own.len()
+                        listed.len() - covered.len(),
+                        listed.len()
                     ));
                 }
-                if !add_faces(mesh, solid, &set, &chosen).all {
+                if !add_faces(mesh, solid, &set, &chosen).whole {
                     let _ = writeln!(lines, "faces = {{ set = \"{set}\" }}");
                 }
             }

@@ -200,7 +200,7 @@ impl Writer {
         self.line(format!("[body.{name}]"));
         self.line("model = \"membrane\"".into());
         self.line(format!("on = \"{body}\""));
-        if !found.all {
+        if !found.whole {
             self.line(format!("faces = {{ set = \"{name}\" }}"));
         }
         self.line(format!("law = \"{name}\""));
@@ -267,7 +267,7 @@ impl Writer {
         }
         match found {
             Faces { outside: 0, .. } => None,
-            Faces { all: true, .. } => Some("faces = \"boundary\"".into()),
+            Faces { whole: true, .. } => Some("faces = \"boundary\"".into()),
             _ => Some(format!("faces = {{ set = \"{set}\" }}")),
         }
     }

@@ -121,7 +121,7 @@ pub(super) struct Faces {
     /// Number of other faces.
     pub inside: usize,
     /// True if they are the whole boundary, which needs no set.
-    pub all: bool,
+    pub whole: bool,
 }
 
 /// Adds faces as cells of a named set; those that are not on the boundary stay out.
@@ -131,12 +131,12 @@ pub(super) fn add_faces(mesh: &mut Mesh, solid: Solid, set: &str, faces: &[Vec<u
     let outer: BTreeSet<Vec<u32>> = surface.faces.iter().map(|face| key(face.nodes())).collect();
     let given: BTreeMap<Vec<u32>, &Vec<u32>> = faces.iter().map(|face| (key(face), face)).collect();
     let (on, off): (Vec<_>, Vec<_>) = given.into_iter().partition(|(key, _)| outer.contains(key));
-    let all = on.len() == outer.len();
-    if !all && !on.is_empty() {
+    let whole = on.len() == outer.len();
+    if !whole && !on.is_empty() {
         let block = mesh.block_mut(solid.face());
         let first = block.len() as u32;
         block.nodes.extend(on.iter().flat_map(|(_, face)| face.iter()));
         block.sets.insert(set.to_owned(), (first..first + on.len() as u32).collect());
     }
-    Faces { outside: on.len(), inside: off.len(), all }
+    Faces { outside: on.len(), inside: off.len(), whole }
 }
