@@ -50,12 +50,13 @@ pub unsafe extern "C" fn pliant_grip_nodes(
 ) -> PliantStatus {
     // SAFETY: the caller promises valid pointers.
     unsafe {
-        running(context, simulation, error, |own| {
+        running(context, simulation, error, |running| {
             needed(grip, "grip")?;
             let nodes = array(nodes, count, "nodes")?;
-            let all = own.nodes();
-            if count == 0 || nodes.iter().any(|&node| node as usize >= all) {
-                let message = format!("a grip needs at least one node, with numbers from 0 to {}", all - 1);
+            let node_count = running.nodes();
+            if count == 0 || nodes.iter().any(|&node| node as usize >= node_count) {
+                let message =
+                    format!("a grip needs at least one node, with numbers from 0 to {}", node_count - 1);
                 return Err(Fault::new(PliantStatus::Unknown, message));
             }
             let same = vec![1.0; count];
@@ -74,7 +75,7 @@ pub unsafe extern "C" fn pliant_grip_nodes(
                 *weight += if same { *more } else { 0.0 };
                 same
             });
-            give(grip, "grip", own.take(held, stiffness)?)
+            give(grip, "grip", running.take(held, stiffness)?)
         })
     }
 }
@@ -95,25 +96,25 @@ pub unsafe extern "C" fn pliant_grip_surface(
 ) -> PliantStatus {
     // SAFETY: the caller promises valid pointers.
     unsafe {
-        running(context, simulation, error, |own| {
+        running(context, simulation, error, |running| {
             needed(grip, "grip")?;
             let point: [f64; 3] = numbers(point, "point")?;
             finite(&[radius], "radius")?;
             if radius < 0.0 {
                 return Err(Fault::new(PliantStatus::NotANumber, "`radius` must be at least 0"));
             }
-            own.see_places()?;
-            own.surface(surface)?;
-            let skin = &own.surfaces[surface as usize].skin;
+            running.see_places()?;
+            running.surface(surface)?;
+            let skin = &running.surfaces[surface as usize].skin;
             let (mut nearest, mut least) = (0, f64::INFINITY);
-            skin.positions(&own.world, &own.simulation, |vertex, place| {
+            skin.positions(&running.world, &running.simulation, |vertex, place| {
                 let apart = (0..3).map(|c| (place[c] - point[c]).powi(2)).sum();
                 if apart < least {
                     (nearest, least) = (vertex as u32, apart);
                 }
             });
-            let held = skin.around(&own.simulation, nearest, radius);
-            give(grip, "grip", own.take(held, stiffness)?)
+            let held = skin.around(&running.simulation, nearest, radius);
+            give(grip, "grip", running.take(held, stiffness)?)
         })
     }
 }
@@ -129,10 +130,10 @@ pub unsafe extern "C" fn pliant_grip_move(
 ) -> PliantStatus {
     // SAFETY: the caller promises valid pointers.
     unsafe {
-        running(context, simulation, error, |own| {
+        running(context, simulation, error, |running| {
             let place = numbers(place, "place")?;
-            own.held.get(grip)?.place = place;
-            own.held.put_on(&mut own.simulation)
+            running.held.get(grip)?.place = place;
+            running.held.put_on(&mut running.simulation)
         })
     }
 }
@@ -162,10 +163,10 @@ pub unsafe extern "C" fn pliant_grip(
 ) -> PliantStatus {
     // SAFETY: the caller promises valid pointers.
     unsafe {
-        running(context, simulation, error, |own| {
-            own.see_places()?;
-            let held = own.held.get(grip)?.clone();
-            let [point, force] = own.simulation.pulled(&held);
+        running(context, simulation, error, |running| {
+            running.see_places()?;
+            let held = running.held.get(grip)?.clone();
+            let [point, force] = running.simulation.pulled(&held);
             give(now, "now", PliantGrip { point, place: held.place, force, stiffness: held.stiffness })
         })
     }
@@ -181,10 +182,10 @@ pub unsafe extern "C" fn pliant_grip_release(
 ) -> PliantStatus {
     // SAFETY: the caller promises valid pointers.
     unsafe {
-        running(context, simulation, error, |own| {
-            own.held.get(grip)?;
-            own.held.remove(grip);
-            own.held.put_on(&mut own.simulation)
+        running(context, simulation, error, |running| {
+            running.held.get(grip)?;
+            running.held.remove(grip);
+            running.held.put_on(&mut running.simulation)
         })
     }
 }

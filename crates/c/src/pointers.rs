@@ -59,10 +59,10 @@ pub(crate) unsafe fn array<'a, T>(items: *const T, count: usize, what: &str) -> 
 pub(crate) unsafe fn numbers<const N: usize>(items: *const f64, what: &str) -> Result<[f64; N], Fault> {
     // SAFETY: as the caller promises.
     let items = unsafe { array(items, N, what)? };
-    let mut own = [0.0; N];
-    own.copy_from_slice(items);
-    finite(&own, what)?;
-    Ok(own)
+    let mut copied = [0.0; N];
+    copied.copy_from_slice(items);
+    finite(&copied, what)?;
+    Ok(copied)
 }
 
 /// Says which of some numbers is not finite.

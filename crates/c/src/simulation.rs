@@ -121,10 +121,14 @@ pub unsafe extern "C" fn pliant_now(
 ) -> PliantStatus {
     // SAFETY: the caller promises valid pointers.
     unsafe {
-        running(context, simulation, error, |own| {
-            let Running { simulation, .. } = &*own;
+        running(context, simulation, error, |running| {
+            let Running { simulation, .. } = &*running;
             let [time, step] = [simulation.time(), simulation.step_length()];
-            give(now, "now", PliantNow { time, step, steps: simulation.steps(), nodes: own.nodes() as u64 })
+            give(
+                now,
+                "now",
+                PliantNow { time, step, steps: simulation.steps(), nodes: running.nodes() as u64 },
+            )
         })
     }
 }
@@ -183,18 +187,18 @@ unsafe fn go(
             let shared = context.simulation(simulation)?;
             let mut running = shared.lock()?;
             let stopped = &shared.stopped;
-            let (now, result) = running.compute(|own| {
+            let (now, result) = running.compute(|computing| {
                 let mut taken = 0;
                 let halted = || Fault::new(PliantStatus::Stopped, "another thread asked to stop");
                 let mut step = || {
-                    while let more @ 1.. = left(own.simulation, taken)? {
+                    while let more @ 1.. = left(computing.simulation, taken)? {
                         if stopped.is_asked() {
                             return Err(halted());
                         }
-                        if own.simulation.ended().is_some() {
+                        if computing.simulation.ended().is_some() {
                             break;
                         }
-                        taken += own.simulation.step(more).map_err(|failure| {
+                        taken += computing.simulation.step(more).map_err(|failure| {
                             if failure.is_interrupted() { halted() } else { failure.into() }
                         })?;
                     }
@@ -248,15 +252,16 @@ pub unsafe extern "C" fn pliant_push(
 ) -> PliantStatus {
     // SAFETY: the caller promises valid pointers.
     unsafe {
-        running(context, simulation, error, |own| {
+        running(context, simulation, error, |running| {
             let numbers = array(forces, count.saturating_mul(3), "forces")?;
             finite(numbers, "forces")?;
-            let (forces, nodes) = (numbers.as_chunks().0, own.nodes());
+            let (forces, nodes) = (numbers.as_chunks().0, running.nodes());
             if count > 0 && count != nodes {
                 let message = format!("{count} forces are given, but {nodes} are needed: one for each node");
                 return Err(Fault::new(PliantStatus::ShortBuffer, message));
             }
-            own.simulation
+            running
+                .simulation
                 .push(forces)
                 .map_err(|failure| Fault::new(PliantStatus::Unsupported, failure.message))
         })
@@ -292,8 +297,8 @@ pub unsafe extern "C" fn pliant_name(
 ) -> PliantStatus {
     // SAFETY: the caller promises valid pointers.
     unsafe {
-        running(context, simulation, error, |own| {
-            let names = names(own, kind)?;
+        running(context, simulation, error, |running| {
+            let names = names(running, kind)?;
             let Some(name) = names.get(index) else {
                 let message = format!("there are only {} of this kind", names.len());
                 return Err(Fault::new(PliantStatus::Unknown, message));
@@ -304,19 +309,23 @@ pub unsafe extern "C" fn pliant_name(
 }
 
 /// The names of all things of a kind.
-pub(crate) fn names(own: &Running, kind: u32) -> Result<Vec<String>, Fault> {
-    let parts = || own.simulation.setup().parts.iter();
+pub(crate) fn names(running: &Running, kind: u32) -> Result<Vec<String>, Fault> {
+    let parts = || running.simulation.setup().parts.iter();
     let models = || parts().map(|part| &part.model);
     let contacts = || parts().filter_map(|part| part.method.contacts());
     let names: Vec<&str> = match kind {
-        PLIANT_BODIES => models().flat_map(|model| &model.bodies).map(|own| own.name.as_str()).collect(),
-        PLIANT_SURFACES => models().flat_map(|model| &model.surfaces).map(|own| own.name.as_str()).collect(),
-        PLIANT_CONSTRAINTS => {
-            models().flat_map(|model| &model.constraints).map(|own| own.name.as_str()).collect()
+        PLIANT_BODIES => models().flat_map(|model| &model.bodies).map(|body| body.name.as_str()).collect(),
+        PLIANT_SURFACES => {
+            models().flat_map(|model| &model.surfaces).map(|surface| surface.name.as_str()).collect()
         }
-        PLIANT_CONTACTS => contacts().flat_map(|all| &all.contacts).map(|own| own.name.as_str()).collect(),
-        PLIANT_TOOLS => contacts().flat_map(|all| &all.rigids).map(|own| own.tool()).collect(),
-        PLIANT_WARNINGS => own.world.warnings().map(|warning| warning.message.as_str()).collect(),
+        PLIANT_CONSTRAINTS => {
+            models().flat_map(|model| &model.constraints).map(|constraint| constraint.name.as_str()).collect()
+        }
+        PLIANT_CONTACTS => {
+            contacts().flat_map(|set| &set.contacts).map(|contact| contact.name.as_str()).collect()
+        }
+        PLIANT_TOOLS => contacts().flat_map(|set| &set.rigids).map(|rigid| rigid.tool()).collect(),
+        PLIANT_WARNINGS => running.world.warnings().map(|warning| warning.message.as_str()).collect(),
         other => {
             let message =
                 format!("names have no kind {other}: take PLIANT_BODIES or another constant for names");

@@ -32,9 +32,9 @@ pub unsafe extern "C" fn pliant_snapshot_take(
 ) -> PliantStatus {
     // SAFETY: the caller promises valid pointers.
     unsafe {
-        running(context, simulation, error, |own| {
+        running(context, simulation, error, |running| {
             needed(snapshot, "snapshot")?;
-            let (setup, state) = (Arc::clone(own.simulation.setup()), own.simulation.state()?);
+            let (setup, state) = (Arc::clone(running.simulation.setup()), running.simulation.state()?);
             let item = Item::Snapshot(Arc::new(OpenSnapshot { setup, state }));
             give(snapshot, "snapshot", known(context)?.open(item))
         })
@@ -52,16 +52,16 @@ pub unsafe extern "C" fn pliant_snapshot_restore(
 ) -> PliantStatus {
     // SAFETY: the caller promises valid pointers.
     unsafe {
-        running(context, simulation, error, |own| {
+        running(context, simulation, error, |running| {
             let snapshot = known(context)?.snapshot(snapshot)?;
-            if !Arc::ptr_eq(&snapshot.setup, own.simulation.setup()) {
+            if !Arc::ptr_eq(&snapshot.setup, running.simulation.setup()) {
                 // Of another simulation, it has to be one of this model.
                 let bytes = snapshot_to_bytes(&snapshot.setup, &snapshot.state)?;
-                snapshot_from_bytes(own.simulation.setup(), &bytes)
+                snapshot_from_bytes(running.simulation.setup(), &bytes)
                     .map_err(|failure| Fault::new(PliantStatus::BadSnapshot, failure.message))?;
             }
-            own.compute(|now| now.simulation.restore(snapshot.state.clone()))?;
-            own.held.put_on(&mut own.simulation)
+            running.compute(|now| now.simulation.restore(snapshot.state.clone()))?;
+            running.held.put_on(&mut running.simulation)
         })
     }
 }
@@ -100,9 +100,9 @@ pub unsafe extern "C" fn pliant_snapshot_read(
 ) -> PliantStatus {
     // SAFETY: the caller promises valid pointers.
     unsafe {
-        running(context, simulation, error, |own| {
+        running(context, simulation, error, |running| {
             needed(snapshot, "snapshot")?;
-            let setup = Arc::clone(own.simulation.setup());
+            let setup = Arc::clone(running.simulation.setup());
             let state = snapshot_from_bytes(&setup, array(bytes, count, "bytes")?)
                 .map_err(|failure| Fault::new(PliantStatus::BadSnapshot, failure.message))?;
             let item = Item::Snapshot(Arc::new(OpenSnapshot { setup, state }));

@@ -63,11 +63,12 @@ pub unsafe extern "C" fn pliant_surface_open(
 ) -> PliantStatus {
     // SAFETY: the caller promises valid pointers.
     unsafe {
-        running(context, simulation, error, |own| {
+        running(context, simulation, error, |running| {
             needed(surface, "surface")?;
             let name = some_text(name, "name")?;
-            let Some(skin) = Skin::new(&own.world, name) else {
-                let known = [names(own, PLIANT_BODIES)?, names(own, PLIANT_SURFACES)?].concat().join(", ");
+            let Some(skin) = Skin::new(&running.world, name) else {
+                let known =
+                    [names(running, PLIANT_BODIES)?, names(running, PLIANT_SURFACES)?].concat().join(", ");
                 return Err(Fault::new(
                     PliantStatus::Unknown,
                     match name {
@@ -78,13 +79,13 @@ pub unsafe extern "C" fn pliant_surface_open(
             };
             let (vertices, triangles) = (skin.rest().len(), skin.triangles().len());
             let found = PliantSurface {
-                number: own.surfaces.len() as u32,
+                number: running.surfaces.len() as u32,
                 vertices: vertices as u32,
                 triangles: triangles as u32,
             };
             let zeros = || vec![[0.0; 3]; vertices];
             let vertices = Vertices { places: zeros(), normals: zeros() };
-            own.surfaces.push(OpenSurface { skin, lent: vertices.clone(), own: vertices });
+            running.surfaces.push(OpenSurface { skin, lent: vertices.clone(), copied: vertices });
             give(surface, "surface", found)
         })
     }
@@ -103,14 +104,15 @@ pub unsafe extern "C" fn pliant_surface_triangles(
 ) -> PliantStatus {
     // SAFETY: the caller promises valid pointers.
     unsafe {
-        running(context, simulation, error, |own| {
-            let all = own.surface(surface)?.skin.triangles();
-            if capacity < all.len() {
-                let message = format!("there is room for {capacity} triangles, but {} are needed", all.len());
+        running(context, simulation, error, |running| {
+            let faces = running.surface(surface)?.skin.triangles();
+            if capacity < faces.len() {
+                let message =
+                    format!("there is room for {capacity} triangles, but {} are needed", faces.len());
                 return Err(Fault::new(PliantStatus::ShortBuffer, message));
             }
             needed(triangles, "triangles")?;
-            let flat = all.as_flattened();
+            let flat = faces.as_flattened();
             triangles.cast::<u8>().copy_from_nonoverlapping(flat.as_ptr().cast(), size_of_val(flat));
             Ok(())
         })
@@ -128,10 +130,10 @@ pub unsafe extern "C" fn pliant_surface_positions(
 ) -> PliantStatus {
     // SAFETY: the caller promises valid pointers.
     unsafe {
-        running(context, simulation, error, |own| {
-            own.see_places()?;
-            let vertices = own.surface(surface)?.skin.rest().len();
-            let Running { world, simulation, surfaces, .. } = own;
+        running(context, simulation, error, |running| {
+            running.see_places()?;
+            let vertices = running.surface(surface)?.skin.rest().len();
+            let Running { world, simulation, surfaces, .. } = running;
             let writer = buffer.writer(vertices)?;
             surfaces[surface as usize]
                 .skin
@@ -152,8 +154,8 @@ pub unsafe extern "C" fn pliant_surface_normals(
 ) -> PliantStatus {
     // SAFETY: the caller promises valid pointers.
     unsafe {
-        running(context, simulation, error, |own| {
-            let found = own.bring(surface, true, |open| (&open.skin, &mut open.own))?;
+        running(context, simulation, error, |running| {
+            let found = running.bring(surface, true, |open| (&open.skin, &mut open.copied))?;
             let writer = buffer.writer(found.normals.len())?;
             found.normals.iter().enumerate().for_each(|(vertex, &normal)| writer.put(vertex, normal));
             Ok(())
@@ -175,9 +177,9 @@ pub unsafe extern "C" fn pliant_surface_lend(
 ) -> PliantStatus {
     // SAFETY: the caller promises valid pointers.
     unsafe {
-        running(context, simulation, error, |own| {
+        running(context, simulation, error, |running| {
             needed(positions, "positions")?;
-            let lent = own.bring(surface, !normals.is_null(), |open| (&open.skin, &mut open.lent))?;
+            let lent = running.bring(surface, !normals.is_null(), |open| (&open.skin, &mut open.lent))?;
             give(positions, "positions", lent.places.as_ptr().cast())?;
             if normals.is_null() { Ok(()) } else { give(normals, "normals", lent.normals.as_ptr().cast()) }
         })

@@ -29,21 +29,21 @@ pub struct PliantTool {
 }
 
 /// Checks that a tool exists.
-fn known(own: &Running, name: &str) -> Result<(), Fault> {
-    own.simulation.tool(name).map(|_| ()).ok_or_else(|| unknown(own, PLIANT_TOOLS, "tool", name))
+fn known(running: &Running, name: &str) -> Result<(), Fault> {
+    running.simulation.tool(name).map(|_| ()).ok_or_else(|| unknown(running, PLIANT_TOOLS, "tool", name))
 }
 
 /// Leads a tool to a pose, its jaws to an angle [rad], or both within a time [s]. `arrival`, if it is not
 /// null, gets the time [s] of arrival.
 unsafe fn lead(
-    own: &mut Running,
+    running: &mut Running,
     name: &str,
     goal: (Option<Pose>, Option<f64>),
     within: f64,
     arrival: *mut f64,
 ) -> Result<(), Fault> {
-    known(own, name)?;
-    let there = own.simulation.lead(name, goal.0, goal.1, within);
+    known(running, name)?;
+    let there = running.simulation.lead(name, goal.0, goal.1, within);
     let there = there.map_err(|failure| Fault::new(PliantStatus::NotANumber, failure.message))?;
     // SAFETY: the caller promises valid pointers.
     if arrival.is_null() { Ok(()) } else { unsafe { give(arrival, "arrival", there) } }
@@ -74,11 +74,11 @@ pub unsafe extern "C" fn pliant_tool_lead(
 ) -> PliantStatus {
     // SAFETY: the caller promises valid pointers.
     unsafe {
-        running(context, simulation, error, |own| {
+        running(context, simulation, error, |running| {
             let name = text(tool, "tool")?;
             let pose = goal(position, rotation)?;
             finite(&[within], "within")?;
-            lead(own, name, (Some(pose), None), within, arrival)
+            lead(running, name, (Some(pose), None), within, arrival)
         })
     }
 }
@@ -97,10 +97,10 @@ pub unsafe extern "C" fn pliant_tool_open(
 ) -> PliantStatus {
     // SAFETY: the caller promises valid pointers.
     unsafe {
-        running(context, simulation, error, |own| {
+        running(context, simulation, error, |running| {
             let name = text(tool, "tool")?;
             finite(&[angle, within], "angle and within")?;
-            lead(own, name, (None, Some(angle)), within, arrival)
+            lead(running, name, (None, Some(angle)), within, arrival)
         })
     }
 }
@@ -121,11 +121,11 @@ pub unsafe extern "C" fn pliant_tool_lead_open(
 ) -> PliantStatus {
     // SAFETY: the caller promises valid pointers.
     unsafe {
-        running(context, simulation, error, |own| {
+        running(context, simulation, error, |running| {
             let name = text(tool, "tool")?;
             let pose = goal(position, rotation)?;
             finite(&[angle, within], "angle and within")?;
-            lead(own, name, (Some(pose), Some(angle)), within, arrival)
+            lead(running, name, (Some(pose), Some(angle)), within, arrival)
         })
     }
 }
@@ -141,11 +141,12 @@ pub unsafe extern "C" fn pliant_tool(
 ) -> PliantStatus {
     // SAFETY: the caller promises valid pointers.
     unsafe {
-        running(context, simulation, error, |own| {
+        running(context, simulation, error, |running| {
             needed(now, "now")?;
             let name = text(tool, "tool")?;
-            own.look()?;
-            let found = own.simulation.tool(name).ok_or_else(|| unknown(own, PLIANT_TOOLS, "tool", name))?;
+            running.look()?;
+            let found =
+                running.simulation.tool(name).ok_or_else(|| unknown(running, PLIANT_TOOLS, "tool", name))?;
             let found = PliantTool {
                 position: found.pose.translation.vector.into(),
                 rotation: found.pose.rotation.coords.into(),

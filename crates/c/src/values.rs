@@ -26,8 +26,8 @@ pub struct PliantNodes {
 }
 
 /// Fault of an unknown name, with the known names.
-pub(crate) fn unknown(own: &Running, kind: u32, what: &str, name: &str) -> Fault {
-    let known = names(own, kind).unwrap_or_default();
+pub(crate) fn unknown(running: &Running, kind: u32, what: &str, name: &str) -> Fault {
+    let known = names(running, kind).unwrap_or_default();
     let those = if known.is_empty() {
         "the simulation has none".into()
     } else {
@@ -37,17 +37,18 @@ pub(crate) fn unknown(own: &Running, kind: u32, what: &str, name: &str) -> Fault
 }
 
 /// The nodes of a body by name; null is all bodies.
-fn nodes(own: &Running, body: Option<&str>) -> Result<PliantNodes, Fault> {
-    let Some(name) = body else { return Ok(PliantNodes { first: 0, count: own.nodes() as u64 }) };
-    let parts = own.simulation.setup().parts.iter().enumerate();
-    let found = parts.flat_map(|(part, own)| own.model.bodies.iter().map(move |body| (part, body)));
+fn nodes(running: &Running, body: Option<&str>) -> Result<PliantNodes, Fault> {
+    let Some(name) = body else { return Ok(PliantNodes { first: 0, count: running.nodes() as u64 }) };
+    let parts = running.simulation.setup().parts.iter().enumerate();
+    let found =
+        parts.flat_map(|(part, participant)| participant.model.bodies.iter().map(move |body| (part, body)));
     let mut found = found.filter(|(_, body)| body.name == name);
     match found.next() {
         Some((part, body)) => {
-            let first = u64::from(own.simulation.node(part, body.nodes.start));
+            let first = u64::from(running.simulation.node(part, body.nodes.start));
             Ok(PliantNodes { first, count: u64::from(body.nodes.end - body.nodes.start) })
         }
-        None => Err(unknown(own, PLIANT_BODIES, "body", name)),
+        None => Err(unknown(running, PLIANT_BODIES, "body", name)),
     }
 }
 
@@ -63,7 +64,9 @@ pub unsafe extern "C" fn pliant_body(
 ) -> PliantStatus {
     // SAFETY: the caller promises valid pointers.
     unsafe {
-        running(context, simulation, error, |own| give(found, "found", nodes(own, some_text(body, "body")?)?))
+        running(context, simulation, error, |running| {
+            give(found, "found", nodes(running, some_text(body, "body")?)?)
+        })
     }
 }
 
@@ -89,8 +92,8 @@ pub unsafe extern "C" fn pliant_nodes(
 ) -> PliantStatus {
     // SAFETY: the caller promises valid pointers.
     unsafe {
-        running(context, simulation, error, |own| {
-            let PliantNodes { first, count } = nodes(own, some_text(body, "body")?)?;
+        running(context, simulation, error, |running| {
+            let PliantNodes { first, count } = nodes(running, some_text(body, "body")?)?;
             if what > PLIANT_REST {
                 let message = format!(
                     "node values have no kind {what}: take PLIANT_POSITION or another constant for nodes"
@@ -99,11 +102,11 @@ pub unsafe extern "C" fn pliant_nodes(
             }
             let writer = buffer.writer(count as usize)?;
             if what == PLIANT_VELOCITY {
-                own.look()?
+                running.look()?
             } else {
-                own.see_places()?
+                running.see_places()?
             }
-            let simulation = &own.simulation;
+            let simulation = &running.simulation;
             let mut node = 0;
             for (part, now) in simulation.setup().parts.iter().zip(simulation.instants()) {
                 for (local, rest) in part.model.rest.iter().enumerate() {
@@ -152,19 +155,19 @@ pub unsafe extern "C" fn pliant_field(
 ) -> PliantStatus {
     // SAFETY: the caller promises valid pointers.
     unsafe {
-        running(context, simulation, error, |own| {
+        running(context, simulation, error, |running| {
             let (on, name) = (some_text(on, "on")?, text(name, "name")?);
-            let bodies = names(own, PLIANT_BODIES)?;
+            let bodies = names(running, PLIANT_BODIES)?;
             let on = match (on, &bodies[..]) {
                 (Some(on), _) => on,
                 (None, [only]) => only,
-                (None, all) => {
-                    let message = format!("there are several bodies: name one of {}", all.join(", "));
+                (None, choices) => {
+                    let message = format!("there are several bodies: name one of {}", choices.join(", "));
                     return Err(Fault::new(PliantStatus::Unknown, message));
                 }
             };
             let known = |open: &OpenField| (open.on.as_str(), open.name.as_str(), open.at) == (on, name, at);
-            let place = match own.fields.iter().position(known) {
+            let place = match running.fields.iter().position(known) {
                 Some(place) => place,
                 None => {
                     let kind = match at {
@@ -176,16 +179,16 @@ pub unsafe extern "C" fn pliant_field(
                             return Err(Fault::new(PliantStatus::NotANumber, message));
                         }
                     };
-                    let reader = FieldReader::new(&own.world, Some(on), name, kind);
+                    let reader = FieldReader::new(&running.world, Some(on), name, kind);
                     let reader =
                         reader.map_err(|failure| Fault::new(PliantStatus::Unknown, failure.message))?;
-                    own.fields.push(OpenField { on: on.to_owned(), name: name.to_owned(), at, reader });
-                    own.fields.len() - 1
+                    running.fields.push(OpenField { on: on.to_owned(), name: name.to_owned(), at, reader });
+                    running.fields.len() - 1
                 }
             };
-            own.look()?;
-            own.compute(|now| now.fields[place].reader.fill(now.world, now.simulation));
-            let reader = &own.fields[place].reader;
+            running.look()?;
+            running.compute(|now| now.fields[place].reader.fill(now.world, now.simulation));
+            let reader = &running.fields[place].reader;
             let values =
                 reader.values().map_err(|failure| Fault::new(PliantStatus::Unknown, failure.message))?;
             let width = reader.components();
@@ -214,12 +217,16 @@ pub unsafe extern "C" fn pliant_reaction(
 ) -> PliantStatus {
     // SAFETY: the caller promises valid pointers.
     unsafe {
-        running(context, simulation, error, |own| {
+        running(context, simulation, error, |running| {
             needed(force, "force")?;
             let name = text(constraint, "constraint")?;
-            own.look()?;
-            let found = own.simulation.frame()?.reaction(name);
-            give(force, "force", found.ok_or_else(|| unknown(own, PLIANT_CONSTRAINTS, "constraint", name))?)
+            running.look()?;
+            let found = running.simulation.frame()?.reaction(name);
+            give(
+                force,
+                "force",
+                found.ok_or_else(|| unknown(running, PLIANT_CONSTRAINTS, "constraint", name))?,
+            )
         })
     }
 }
@@ -235,12 +242,12 @@ pub unsafe extern "C" fn pliant_contact_force(
 ) -> PliantStatus {
     // SAFETY: the caller promises valid pointers.
     unsafe {
-        running(context, simulation, error, |own| {
+        running(context, simulation, error, |running| {
             needed(force, "force")?;
             let name = text(contact, "contact")?;
-            own.look()?;
-            let found = own.simulation.frame()?.contact_force(name);
-            give(force, "force", found.ok_or_else(|| unknown(own, PLIANT_CONTACTS, "contact", name))?)
+            running.look()?;
+            let found = running.simulation.frame()?.contact_force(name);
+            give(force, "force", found.ok_or_else(|| unknown(running, PLIANT_CONTACTS, "contact", name))?)
         })
     }
 }
@@ -275,13 +282,13 @@ pub unsafe extern "C" fn pliant_energies(
 ) -> PliantStatus {
     // SAFETY: the caller promises valid pointers.
     unsafe {
-        running(context, simulation, error, |own| {
-            own.look()?;
+        running(context, simulation, error, |running| {
+            running.look()?;
             let Energies { kinetic, internal, damping, hourglass, external, step_changes, balance } =
-                own.simulation.energies();
-            let all =
+                running.simulation.energies();
+            let values =
                 PliantEnergies { kinetic, internal, damping, hourglass, external, step_changes, balance };
-            give(energies, "energies", all)
+            give(energies, "energies", values)
         })
     }
 }
@@ -296,9 +303,9 @@ pub unsafe extern "C" fn pliant_fingerprint(
 ) -> PliantStatus {
     // SAFETY: the caller promises valid pointers.
     unsafe {
-        running(context, simulation, error, |own| {
-            own.see_places()?;
-            give(fingerprint, "fingerprint", own.simulation.fingerprint())
+        running(context, simulation, error, |running| {
+            running.see_places()?;
+            give(fingerprint, "fingerprint", running.simulation.fingerprint())
         })
     }
 }

@@ -56,9 +56,9 @@ fn build(compiler: &str, standard: &str, file: &Path, folder: &Path, more: &[&st
 
 fn run(program: &Path, arguments: &[&str]) -> String {
     // Before what cargo says, which may name an older build.
-    let own = libraries();
+    let library_path = libraries();
     let Output { status, stdout, stderr } = Command::new(program)
-        .env("LD_LIBRARY_PATH", own)
+        .env("LD_LIBRARY_PATH", library_path)
         .args(arguments)
         .current_dir(Path::new(OWN).join("../.."))
         .output()

@@ -32,7 +32,7 @@ fn declared(of: &str, name: &str) -> String {
     {
         return declared(item, &format!("{name}[{count}]"));
     }
-    let own = match of {
+    let c_type = match of {
         "u8" | "u32" | "u64" | "i32" | "i64" => {
             return format!(
                 "{}_t {name}",
@@ -44,9 +44,9 @@ fn declared(of: &str, name: &str) -> String {
         "c_char" => "char",
         "c_void" => "void",
         "()" => "void",
-        own => own,
+        record => record,
     };
-    format!("{own} {name}").trim_end().to_owned()
+    format!("{c_type} {name}").trim_end().to_owned()
 }
 
 /// `ShortBuffer` as `SHORT_BUFFER`.
@@ -95,29 +95,34 @@ fn translated(source: &str) -> String {
         {
             let _ = write!(out, "\n{}typedef enum {name} {{\n", comment(&docs, ""));
             fields(&mut lines, &mut |docs, field| {
-                let (own, value) = field.trim_end_matches(',').split_once(" = ").unwrap();
-                let own = format!("{}_{}", shouted(name), shouted(own));
-                let _ = writeln!(out, "{}    {own} = {value},", comment(docs, "    "));
+                let (variant, value) = field.trim_end_matches(',').split_once(" = ").unwrap();
+                let constant = format!("{}_{}", shouted(name), shouted(variant));
+                let _ = writeln!(out, "{}    {constant} = {value},", comment(docs, "    "));
             });
             let _ = writeln!(out, "}} {name};");
         } else if let Some(rest) = line.split_once("extern \"C\" fn ").map(|(_, rest)| rest).filter(|_| is_c)
         {
-            let mut all = rest.to_owned();
-            while !all.ends_with('{') {
-                all.push(' ');
-                all.push_str(lines.next().expect("a declaration ends"));
+            let mut declaration = rest.to_owned();
+            while !declaration.ends_with('{') {
+                declaration.push(' ');
+                declaration.push_str(lines.next().expect("a declaration ends"));
             }
-            let (name, rest) = all.split_once('(').unwrap();
+            let (name, rest) = declaration.split_once('(').unwrap();
             let (parameters, result) = rest.split_once(')').unwrap();
             let result = result.trim().trim_end_matches('{').trim().strip_prefix("-> ").unwrap_or("()");
-            let own = parameters.split(", ").map(|one| one.trim().trim_end_matches(','));
-            let own = own.filter(|one| !one.is_empty()).map(|one| {
+            let arguments = parameters.split(", ").map(|one| one.trim().trim_end_matches(','));
+            let arguments = arguments.filter(|one| !one.is_empty()).map(|one| {
                 let (name, of) = one.split_once(": ").unwrap();
                 declared(of, name)
             });
-            let own: Vec<String> = own.collect();
-            let own = if own.is_empty() { "void".into() } else { own.join(", ") };
-            let _ = write!(out, "\n{}{};\n", comment(&docs, ""), declared(result, &format!("{name}({own})")));
+            let arguments: Vec<String> = arguments.collect();
+            let arguments = if arguments.is_empty() { "void".into() } else { arguments.join(", ") };
+            let _ = write!(
+                out,
+                "\n{}{};\n",
+                comment(&docs, ""),
+                declared(result, &format!("{name}({arguments})"))
+            );
         }
         is_c = line == "#[repr(C)]" || line == "#[unsafe(no_mangle)]" || is_c && line.starts_with("#[");
         if !line.starts_with("#[") {
@@ -143,20 +148,20 @@ fn fields<'s>(lines: &mut impl Iterator<Item = &'s str>, take: &mut dyn FnMut(&[
 
 #[test]
 fn the_header_is_that_of_the_crate() {
-    let own = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut made = HEAD.to_owned();
     for name in FILES {
-        made += &translated(&fs::read_to_string(own.join(format!("src/{name}.rs"))).unwrap());
+        made += &translated(&fs::read_to_string(folder.join(format!("src/{name}.rs"))).unwrap());
     }
     made += END;
-    let path = own.join("include/pliant.h");
+    let path = folder.join("include/pliant.h");
     if std::env::var_os("PLIANT_BLESS").is_some() {
         fs::write(&path, &made).unwrap();
     }
     let kept = fs::read_to_string(&path).unwrap_or_default();
     assert!(kept == made, "include/pliant.h is out of date: see the top of this file");
     // Every call is declared: those that the library shows by name.
-    let calls = FILES.map(|name| fs::read_to_string(own.join(format!("src/{name}.rs"))).unwrap());
+    let calls = FILES.map(|name| fs::read_to_string(folder.join(format!("src/{name}.rs"))).unwrap());
     let shown = calls.iter().map(|text| text.matches("#[unsafe(no_mangle)]").count()).sum::<usize>();
     assert_eq!(made.matches("(const PliantContext *context,").count() + 4, shown);
 }

@@ -81,7 +81,7 @@ fn the_border_costs_less_than_a_microsecond_a_step() {
     let text = block("[2, 2, 2]");
     let Opened { context, simulation } = open(&text);
     let scene = Scene::from_source(Source::parse("block.toml", text).unwrap(), ".".into()).unwrap();
-    let mut own = World::new(&scene).unwrap().simulation().unwrap();
+    let mut rust_simulation = World::new(&scene).unwrap().simulation().unwrap();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     // SAFETY: the context is open.
     let mut through_c = || unsafe {
@@ -89,7 +89,7 @@ fn the_border_costs_less_than_a_microsecond_a_step() {
         assert_eq!(status, PliantStatus::Ok);
     };
     let mut in_rust = || {
-        pool.install(|| own.step(1)).unwrap();
+        pool.install(|| rust_simulation.step(1)).unwrap();
     };
     let (mut ours, mut theirs) = (Vec::new(), Vec::new());
     for _ in 0..20_000 {
@@ -106,7 +106,7 @@ fn the_border_costs_less_than_a_microsecond_a_step() {
     let mut thousand_in_rust = || {
         pool.install(|| {
             for _ in 0..1000 {
-                own.step(1).unwrap();
+                rust_simulation.step(1).unwrap();
             }
         });
     };

@@ -118,9 +118,9 @@ impl LocalModel {
         if skew > 1e-9 * scale || least < -1e-9 * scale {
             return Err(HapticsError::Compliance { least });
         }
-        let mut own = [Plane::NONE; MOST_PLANES];
-        own[..planes.len()].copy_from_slice(planes);
-        Ok(Self { planes: own, count: planes.len(), compliance, place, force, period })
+        let mut padded = [Plane::NONE; MOST_PLANES];
+        padded[..planes.len()].copy_from_slice(planes);
+        Ok(Self { planes: padded, count: planes.len(), compliance, place, force, period })
     }
 
     /// Makes a model that gives exactly this force [N] at this place [m]. Its first plane touches, and the

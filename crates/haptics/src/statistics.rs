@@ -68,8 +68,8 @@ impl fmt::Display for Spread {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match [0.5, 0.99].map(|part| self.quantile(part)) {
             [Some(half), Some(most)] => {
-                let [half, most, all] = [half, most, self.largest].map(|time| 1e3 * time);
-                write!(f, "p50 {half:.3} ms, p99 {most:.3} ms, max {all:.3} ms")
+                let [half, most, largest] = [half, most, self.largest].map(|time| 1e3 * time);
+                write!(f, "p50 {half:.3} ms, p99 {most:.3} ms, max {largest:.3} ms")
             }
             _ => f.write_str("none"),
         }

@@ -125,10 +125,10 @@ impl Haptics {
             buttons: 0,
             opening: 0.0,
         };
-        let (told, states) = triple_buffer(&state);
+        let (input, states) = triple_buffer(&state);
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = Arc::clone(&stop);
-        let run = move || run(renderer, device, taken, told, &stopped);
+        let run = move || run(renderer, device, taken, input, &stopped);
         let thread = std::thread::Builder::new().name("haptics".into()).spawn(run);
         let thread =
             thread.map_err(|error| HapticsError::Thread { problem: format!("cannot start: {error}") })?;

@@ -117,7 +117,7 @@ impl Trace {
     /// Returns the pose at a time [s]. Between two rows it follows a straight line and the shortest arc.
     /// Before the first and after the last row it rests.
     pub fn at(&self, time: f64) -> Isometry3<f64> {
-        let after = self.0.partition_point(|&(own, _)| own <= time);
+        let after = self.0.partition_point(|&(instant, _)| instant <= time);
         match (after.checked_sub(1).map(|before| self.0[before]), self.0.get(after)) {
             (Some((from, a)), Some((to, b))) => {
                 let part = (time - from) / (to - from);
@@ -179,8 +179,8 @@ impl Trace {
         })?;
         for (time, pose) in &mut made.0 {
             *time += first;
-            let own = self.at(*time);
-            *pose = Isometry3::from_parts(pose.translation * own.translation, own.rotation);
+            let original = self.at(*time);
+            *pose = Isometry3::from_parts(pose.translation * original.translation, original.rotation);
         }
         Ok(made)
     }

@@ -19,7 +19,7 @@ struct World {
     friction: f64,
     /// Ticks of a step of the simulation.
     period: u32,
-    told: Told,
+    local_stiffness: Told,
 }
 
 /// Stiffness of the local model.
@@ -50,7 +50,7 @@ impl World {
 
     fn model(&self, place: Vector3<f64>, force: Vector3<f64>, estimate: &Estimate) -> LocalModel {
         let plane = Plane { normal: Vector3::z(), gap: place.z, friction: self.friction };
-        let compliance = match self.told {
+        let compliance = match self.local_stiffness {
             Told::Times(factor) => {
                 Matrix3::from_diagonal(&Vector3::new(1.5, 1.5, 1.0)) / (factor * self.stiffness)
             }
@@ -137,7 +137,7 @@ fn press_and_scrape(duration: f64) -> Trace {
     Trace::read(&table).unwrap()
 }
 
-const WALL: World = World { stiffness: 500.0, friction: 0.3, period: 10, told: Told::Times(1.0) };
+const WALL: World = World { stiffness: 500.0, friction: 0.3, period: 10, local_stiffness: Told::Times(1.0) };
 /// Steps of 500, 100 and 30 Hz.
 const PERIODS: [u32; 3] = [2, 10, 33];
 const TOLD: [Told; 4] = [Told::Times(0.5), Told::Times(1.0), Told::Times(2.0), Told::Estimated];
@@ -147,14 +147,17 @@ const TOLD: [Told; 4] = [Told::Times(0.5), Told::Times(1.0), Told::Times(2.0), T
 fn at_rest_the_device_feels_the_force_of_the_simulation() {
     let trace = Trace::steps(at(0.002), Vector3::new(0.003, 0.0, -0.008), [0.2, 10.0], 3.0).unwrap();
     for period in PERIODS {
-        for told in TOLD {
-            let world = World { period, told, ..WALL };
+        for local_stiffness in TOLD {
+            let world = World { period, local_stiffness, ..WALL };
             let Outcome { forces: [device, simulated], .. } =
                 run(&world, Settings::default(), &Mover::Hand(&trace, Hand::default()));
             assert!(simulated.norm() > 0.5, "{simulated}");
             // The hand has not come to rest to the last digit.
             let off = (device - simulated).norm() / simulated.norm();
-            println!("steps of {period} ms, {told:?}: {:.4} N, off by {off:.1e}", simulated.norm());
+            println!(
+                "steps of {period} ms, {local_stiffness:?}: {:.4} N, off by {off:.1e}",
+                simulated.norm()
+            );
             assert!(off < 1e-3, "{world:?}: {device} {simulated}");
         }
     }
@@ -177,14 +180,18 @@ fn the_force_does_not_jump() {
     ];
     for (name, trace) in &traces {
         for period in PERIODS {
-            for told in TOLD {
-                let record =
-                    run(&World { period, told, ..WALL }, Settings::default(), &Mover::Trace(trace)).record;
+            for local_stiffness in TOLD {
+                let record = run(
+                    &World { period, local_stiffness, ..WALL },
+                    Settings::default(),
+                    &Mover::Trace(trace),
+                )
+                .record;
                 println!(
-                    "{name}, steps of {period} ms, {told:?}: jump {:.3} N at {:.2} N, guarded {}",
+                    "{name}, steps of {period} ms, {local_stiffness:?}: jump {:.3} N at {:.2} N, guarded {}",
                     record.jump, record.peak, record.guarded
                 );
-                assert!(record.jump < 0.3, "{name} {period} {told:?}: {} N", record.jump);
+                assert!(record.jump < 0.3, "{name} {period} {local_stiffness:?}: {} N", record.jump);
             }
         }
     }
@@ -199,18 +206,22 @@ fn a_minute_of_pressing_and_scraping_gives_no_energy() {
     let press = Trace::sine(at(0.0), Vector3::new(0.0, 0.0, 0.008), 0.5, 60.0).unwrap();
     let hand = Hand::default();
     for period in PERIODS {
-        for told in TOLD {
+        for local_stiffness in TOLD {
             for (name, mover, passive) in [
                 ("scraping, a trace", Mover::Trace(&scrape), true),
                 ("scraping, a hand", Mover::Hand(&scrape, hand), true),
-                ("pressing, a trace", Mover::Trace(&press), matches!(told, Told::Times(1.0..))),
-                ("pressing, a hand", Mover::Hand(&press, hand), matches!(told, Told::Times(1.0..))),
+                ("pressing, a trace", Mover::Trace(&press), matches!(local_stiffness, Told::Times(1.0..))),
+                (
+                    "pressing, a hand",
+                    Mover::Hand(&press, hand),
+                    matches!(local_stiffness, Told::Times(1.0..)),
+                ),
             ] {
-                let world = World { period, told, ..WALL };
+                let world = World { period, local_stiffness, ..WALL };
                 let [guarded, alone] = [Some(Guard::default()), None]
                     .map(|guard| run(&world, Settings { guard, ..Settings::default() }, &mover).record);
                 println!(
-                    "{name}, steps of {period} ms, {told:?}: {:.2} mJ, least {:.4} mJ, {} ticks guarded; without guard least {:.4} mJ",
+                    "{name}, steps of {period} ms, {local_stiffness:?}: {:.2} mJ, least {:.4} mJ, {} ticks guarded; without guard least {:.4} mJ",
                     1e3 * guarded.energy,
                     1e3 * guarded.least_energy,
                     guarded.guarded,

@@ -128,10 +128,10 @@ class Session:
 
     def socket(self):
         """A sender."""
-        own = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        own.connect(("127.0.0.1", self.port))
-        own.setblocking(False)
-        return own
+        sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        sender.connect(("127.0.0.1", self.port))
+        sender.setblocking(False)
+        return sender
 
     def listen(self):
         """What it tells, counted; the last lines are kept."""
@@ -233,7 +233,7 @@ class Session:
 
     def row(self):
         """What it has done."""
-        memory = " ".join(f"{own:.1f}" for own in self.memory) or "–"
+        memory = " ".join(f"{size:.1f}" for size in self.memory) or "–"
         return (
             f"{self.name}: {self.sent} poses and {self.hostile} hostile datagrams sent, {self.answers} answers, "
             f"{self.pressing / max(self.answers, 1):.0%} with a force, peak {self.peak:.3f} N, largest jump {self.jump:.6f} N, "
@@ -247,8 +247,8 @@ class Session:
             if self.process.wait(30) != 0:
                 self.fault(f"it ended with {self.process.returncode}")
         self.listener.join(5)
-        told = self.out.read_text()
-        simulated = re.search(r"simulation +([0-9.]+) s", told)
+        report = self.out.read_text()
+        simulated = re.search(r"simulation +([0-9.]+) s", report)
         if not simulated or float(simulated[1]) < 0.5 * seconds:
             self.fault("it has simulated too little")
         if self.peak > LIMIT + ROUND_OFF:
@@ -257,7 +257,7 @@ class Session:
             self.fault(f"a message of {self.longest} bytes")
         if self.memory and self.memory[1] > 1.05 * self.memory[0]:
             self.fault(f"memory grew from {self.memory[0]:.1f} to {self.memory[1]:.1f} MB")
-        print(f"\n{self.row()}\nlongest line {self.longest} bytes; the last lines: {self.lines}\n{told}")
+        print(f"\n{self.row()}\nlongest line {self.longest} bytes; the last lines: {self.lines}\n{report}")
         print(*(f"FAIL {self.name}: {fault}" for fault in self.faults), sep="\n")
         return not self.faults
 

@@ -17,13 +17,13 @@ pub(crate) struct Held {
 }
 
 impl Held {
-    fn all(&self) -> Vec<Grip> {
+    fn grips(&self) -> Vec<Grip> {
         self.grips.values().cloned().collect()
     }
 
     /// Lets all grips act.
     pub(crate) fn put_on(&self, simulation: &mut Simulation) -> Result<(), Fault> {
-        match simulation.grip(&self.all()) {
+        match simulation.grip(&self.grips()) {
             true => Ok(()),
             false => {
                 let message = "nothing can be held here: the solver does not support grips, or a grip has nodes of several participants";

@@ -8,7 +8,7 @@ pub(crate) struct OpenSurface {
     /// Lent vertices: they change when the surface is lent again.
     pub(crate) lent: Vertices,
     /// Vertices that normals are copied from.
-    pub(crate) own: Vertices,
+    pub(crate) copied: Vertices,
 }
 
 /// Places [m] and unit normals.
