@@ -16,11 +16,11 @@ RUNS = 200
 
 def scene() -> pliant.Scene:
     """A run of a few steps."""
-    own = pliant.Scene(until=0.01, gravity=(0, 0, -9.81))
-    own.law["tissue"] = {"type": "neo-hookean", "young-modulus": 10e3, "poisson-ratio": 0.3}
-    own.body["cube"] = {"mesh": {"block": {"size": [0.1, 0.1, 0.1], "cells": [1, 1, 1]}}, "law": "tissue", "density": 1000.0}
-    own.constraint["base"] = {"type": "fix", "body": "cube", "nodes": {"set": "z-min"}}
-    return own
+    scene = pliant.Scene(until=0.01, gravity=(0, 0, -9.81))
+    scene.law["tissue"] = {"type": "neo-hookean", "young-modulus": 10e3, "poisson-ratio": 0.3}
+    scene.body["cube"] = {"mesh": {"block": {"size": [0.1, 0.1, 0.1], "cells": [1, 1, 1]}}, "law": "tissue", "density": 1000.0}
+    scene.constraint["base"] = {"type": "fix", "body": "cube", "nodes": {"set": "z-min"}}
+    return scene
 
 
 def family() -> int:

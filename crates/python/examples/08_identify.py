@@ -10,14 +10,14 @@ import pliant
 
 def scene() -> pliant.Scene:
     """A block that is pulled by 5 mm."""
-    own = pliant.Scene(until=0.2)
-    own.law["tissue"] = {"type": "neo-hookean", "young-modulus": 3e3, "poisson-ratio": 0.45}
+    scene = pliant.Scene(until=0.2)
+    scene.law["tissue"] = {"type": "neo-hookean", "young-modulus": 3e3, "poisson-ratio": 0.45}
     mesh = {"block": {"size": [0.05, 0.05, 0.1]}, "edge": 0.025}
-    own.body["block"] = {"mesh": mesh, "element": "tet4-anp", "law": "tissue", "density": 1000.0, "damping": 50.0}
-    own.constraint["base"] = {"type": "fix", "body": "block", "nodes": {"set": "z-min"}}
+    scene.body["block"] = {"mesh": mesh, "element": "tet4-anp", "law": "tissue", "density": 1000.0, "damping": 50.0}
+    scene.constraint["base"] = {"type": "fix", "body": "block", "nodes": {"set": "z-min"}}
     hand = {"type": "move", "body": "block", "nodes": {"set": "z-max"}, "by": [0, 0, 0.005], "curve": "smooth-step", "to": 0.15}
-    own.constraint["hand"] = hand
-    return own
+    scene.constraint["hand"] = hand
+    return scene
 
 
 def main(truth: float = 4.2e3) -> float:

@@ -21,7 +21,7 @@ def main() -> dict[str, int]:
     halves = (kidney.points[:, 0] > 0).astype(float)
     marked = Mesh(kidney.points, kidney.cells, point_data={"half": halves}, cell_data={"area": np.ones(len(kidney.cells["triangle"]))})
     print(marked.point_data["half"].mean(), marked.cell_data["area"].sum())
-    counts = {name: sum(len(own) for own in mesh.cells.values()) for name, mesh in found.items()}
+    counts = {name: sum(len(corners) for corners in mesh.cells.values()) for name, mesh in found.items()}
     for name, count in counts.items():
         print(f"{count:6} cells: {name}")
     print(pliant.__version__, pliant.devices())

@@ -91,8 +91,8 @@ impl Trouble {
                     }
                     FailureKind::Blocked => {
                         let blocked = failure.blocked.as_deref();
-                        fields.set_item("driver", blocked.map(|own| own.driver.clone()))?;
-                        fields.set_item("force", blocked.map(|own| own.force))?;
+                        fields.set_item("driver", blocked.map(|blockage| blockage.driver.clone()))?;
+                        fields.set_item("force", blocked.map(|blockage| blockage.force))?;
                         "BlockedError"
                     }
                     FailureKind::NotFinite

@@ -50,9 +50,9 @@ impl Image {
         let axes = Matrix3::from_fn(|row, column| affine[row][column]);
         let grid = Grid::new(dims, Vector3::from_fn(|row, _| affine[row][3]), axes)
             .map_err(|error| Trouble::Mesh(None, error.to_string()))?;
-        let mut own = LabelNames::default();
-        names.iter().for_each(|(label, name)| own.insert(*label, name));
-        let image = pliant_imaging::Image::new(grid, *scalar, bytes, own);
+        let mut label_names = LabelNames::default();
+        names.iter().for_each(|(label, name)| label_names.insert(*label, name));
+        let image = pliant_imaging::Image::new(grid, *scalar, bytes, label_names);
         let image =
             image.ok_or_else(|| Trouble::Value("the bytes of an image do not match its voxels".into()))?;
         Ok(Self(Arc::new(image)))

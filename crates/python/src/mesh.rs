@@ -31,7 +31,7 @@ const SPLIT: [(&str, SplitKind); 2] = [("wedge", SplitKind::Wedge), ("pyramid", 
 
 /// The word for a kind.
 pub fn word(kind: CellKind) -> &'static str {
-    KINDS.iter().find(|(_, own)| *own == kind).map_or("", |(word, _)| word)
+    KINDS.iter().find(|(_, known)| *known == kind).map_or("", |(word, _)| word)
 }
 
 type Blocks<'py> = Vec<(String, PyReadonlyArray2<'py, u32>)>;
@@ -74,14 +74,14 @@ impl Mesh {
         let mut split = Vec::new();
         for (word, nodes) in &cells {
             let nodes = nodes.as_array().iter().copied().collect();
-            let own = cell_data.iter().filter(|(kind, ..)| kind == word);
-            let own = own.map(|(_, name, values)| (name.clone(), data(values))).collect();
+            let cell_values = cell_data.iter().filter(|(kind, ..)| kind == word);
+            let cell_values = cell_values.map(|(_, name, values)| (name.clone(), data(values))).collect();
             let sets = cell_sets.iter().filter(|(kind, ..)| kind == word);
             let sets = sets.map(|(_, name, members)| (name.clone(), set(members))).collect();
-            if let Some((_, kind)) = KINDS.iter().find(|(own, _)| own == word) {
-                mesh.blocks.push(CellBlock { kind: *kind, nodes, data: own, sets });
-            } else if let Some(&(_, kind)) = SPLIT.iter().find(|(own, _)| own == word) {
-                split.push(SplitCells { kind, nodes, data: own, sets });
+            if let Some((_, kind)) = KINDS.iter().find(|(known, _)| known == word) {
+                mesh.blocks.push(CellBlock { kind: *kind, nodes, data: cell_values, sets });
+            } else if let Some(&(_, kind)) = SPLIT.iter().find(|(known, _)| known == word) {
+                split.push(SplitCells { kind, nodes, data: cell_values, sets });
             } else {
                 let known: Vec<&str> =
                     KINDS.iter().map(|(word, _)| *word).chain(SPLIT.map(|(word, _)| word)).collect();
@@ -166,12 +166,12 @@ impl Mesh {
         self.0.label_names.clone()
     }
 
-    /// Sets of points; with `all`, also the points of sets of cells.
-    fn point_sets<'py>(&self, py: Python<'py>, all: bool) -> PyResult<Bound<'py, PyDict>> {
+    /// Sets of points; with `with_cells`, also the points of sets of cells.
+    fn point_sets<'py>(&self, py: Python<'py>, with_cells: bool) -> PyResult<Bound<'py, PyDict>> {
         let sets = PyDict::new(py);
         for name in self.0.set_names() {
-            let own = self.0.point_sets.get(name).cloned();
-            let Some(points) = (if all { self.0.set_points(name) } else { own }) else { continue };
+            let listed = self.0.point_sets.get(name).cloned();
+            let Some(points) = (if with_cells { self.0.set_points(name) } else { listed }) else { continue };
             let points: Bound<'_, PyArray1<u32>> = array1(py, points);
             sets.set_item(name, points)?;
         }

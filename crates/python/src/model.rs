@@ -70,12 +70,12 @@ impl Model {
         let (mut bodies, mut first) = (Vec::new(), 0);
         for part in &self.world.participants {
             let model = &part.built.model;
-            for (own, built) in model.bodies.iter().zip(&part.built.bodies) {
-                let nodes = own.nodes.len();
+            for (body, built) in model.bodies.iter().zip(&part.built.bodies) {
+                let nodes = body.nodes.len();
                 let numbers = (0..built.mesh.points.len() as u32).map(|node| built.number_in_file(node));
                 bodies.push((
                     built.name.clone(),
-                    first + own.nodes.start as usize,
+                    first + body.nodes.start as usize,
                     nodes,
                     Mesh(Arc::new(built.mesh.clone())),
                     array1(py, numbers.collect()),
@@ -104,7 +104,7 @@ impl Model {
 
     /// Names and units of the sampled columns.
     fn columns(&self) -> Vec<(String, &'static str)> {
-        sampled_columns(&self.world).into_iter().map(|own| (own.name, own.unit)).collect()
+        sampled_columns(&self.world).into_iter().map(|column| (column.name, column.unit)).collect()
     }
 
     fn notes(&self) -> Vec<String> {
@@ -198,9 +198,9 @@ impl Model {
 
 /// Returns the names of contacts; for a contact between several things, the names of its pairs.
 pub fn contact_names(world: &World) -> Vec<String> {
-    let all = world.participants.iter().filter_map(|part| part.built.contacts.as_ref());
+    let contacts = world.participants.iter().filter_map(|part| part.built.contacts.as_ref());
     let mut names: Vec<String> =
-        all.flat_map(|own| &own.contacts).map(|contact| contact.name.clone()).collect();
+        contacts.flat_map(|set| &set.contacts).map(|contact| contact.name.clone()).collect();
     let mut known = std::collections::BTreeSet::new();
     names.retain(|name| known.insert(name.clone()));
     names

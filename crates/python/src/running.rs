@@ -16,7 +16,7 @@ pub struct Running {
     pub live: Live,
     pub world: Arc<World>,
     /// Displacements [m] in the binding's own memory, of solvers that keep none; filled after each call.
-    own: Option<Vec<[f64; 3]>>,
+    copied: Option<Vec<[f64; 3]>>,
     /// Address of the displacements, fixed as long as the run lives.
     address: usize,
     shown: VtuTable,
@@ -30,9 +30,9 @@ impl Running {
     pub fn new(live: Live, world: Arc<World>) -> Self {
         let shown = world.scene.shown(1.0);
         let mut running =
-            Self { live, world, own: None, address: 0, shown, readers: Vec::new(), grips: Vec::new() };
+            Self { live, world, copied: None, address: 0, shown, readers: Vec::new(), grips: Vec::new() };
         if running.stepper_s_own().is_none() {
-            running.own = Some(vec![[0.0; 3]; running.nodes()]);
+            running.copied = Some(vec![[0.0; 3]; running.nodes()]);
         }
         running.refresh();
         running.address = running.displacement().address();
@@ -45,27 +45,27 @@ impl Running {
 
     /// Displacements of the only participant, where its stepper keeps them.
     fn stepper_s_own(&self) -> Option<Reals<'_>> {
-        let mut all = self.live.simulation.instants();
-        let first = all.next()?;
-        if all.next().is_some() { None } else { first.displacements() }
+        let mut instants = self.live.simulation.instants();
+        let first = instants.next()?;
+        if instants.next().is_some() { None } else { first.displacements() }
     }
 
     /// Displacements [m] of all nodes.
     pub fn displacement(&self) -> Reals<'_> {
-        match &self.own {
-            Some(own) => Reals::Double(own),
+        match &self.copied {
+            Some(copied) => Reals::Double(copied),
             None => self.stepper_s_own().unwrap_or(Reals::Double(&[])),
         }
     }
 
     /// Fills the binding's own displacements, if the stepper keeps none.
     pub fn refresh(&mut self) {
-        let Some(own) = &mut self.own else { return };
+        let Some(copied) = &mut self.copied else { return };
         let parts = self.world.participants.iter().zip(self.live.simulation.instants());
-        let all = parts.flat_map(|(part, now)| {
+        let displacements = parts.flat_map(|(part, now)| {
             (0..part.built.model.node_count()).map(move |node| now.displacement(node))
         });
-        own.iter_mut().zip(all).for_each(|(own, now)| *own = now);
+        copied.iter_mut().zip(displacements).for_each(|(target, now)| *target = now);
     }
 
     /// True if displacements lie where views look for them.
@@ -84,12 +84,12 @@ impl Running {
         &self,
         of: impl Fn(&dyn pliant_sim::Instant, &pliant_mechanics::Model, usize) -> [f64; 3],
     ) -> Vec<f64> {
-        let mut all = Vec::with_capacity(3 * self.nodes());
+        let mut values = Vec::with_capacity(3 * self.nodes());
         for (part, now) in self.world.participants.iter().zip(self.live.simulation.instants()) {
             let model = &part.built.model;
-            (0..model.node_count()).for_each(|node| all.extend(of(now, model, node)));
+            (0..model.node_count()).for_each(|node| values.extend(of(now, model, node)));
         }
-        all
+        values
     }
 
     /// Positions [m] of all nodes.
@@ -179,9 +179,10 @@ impl Running {
         {
             let bodies = part.built.model.bodies.iter().zip(&part.built.bodies);
             for (body, built) in bodies.filter(|(body, _)| on.is_none_or(|on| on == body.name)) {
-                let node = |own: u32| body.node(own);
-                let place =
-                    |(own, rest): (u32, &Vector3)| rest + Vector3::from(now.displacement(node(own) as usize));
+                let node = |number: u32| body.node(number);
+                let place = |(number, rest): (u32, &Vector3)| {
+                    rest + Vector3::from(now.displacement(node(number) as usize))
+                };
                 let places: Vec<Vector3> = (0..).zip(&built.mesh.points).map(place).collect();
                 let faces: Vec<u32> = (0..built.boundary.faces.len() as u32).collect();
                 let Some(found) = SurfaceLocator::new(&built.boundary, &faces, &places).closest(&at) else {
@@ -195,7 +196,7 @@ impl Running {
                 let corners = patch(&built.mesh.points, &triangles, found.nodes, found.weights, radius);
                 let nodes = corners
                     .into_iter()
-                    .map(|(own, weight)| (self.live.simulation.node(index, node(own)), weight));
+                    .map(|(number, weight)| (self.live.simulation.node(index, node(number)), weight));
                 nearest = Some((distance, nodes.collect()));
             }
         }

@@ -108,14 +108,14 @@ fn plain<'py>(py: Python<'py>, node: &Node) -> PyResult<Bound<'py, PyAny>> {
     Ok(match &node.value {
         Value::Table(entries) => {
             let table = PyDict::new(py);
-            for (key, own) in entries {
-                table.set_item(key, plain(py, own)?)?;
+            for (key, entry) in entries {
+                table.set_item(key, plain(py, entry)?)?;
             }
             table.into_any()
         }
         Value::Array(items) => {
-            let all = items.iter().map(|own| plain(py, own)).collect::<PyResult<Vec<_>>>()?;
-            PyList::new(py, all)?.into_any()
+            let list = items.iter().map(|element| plain(py, element)).collect::<PyResult<Vec<_>>>()?;
+            PyList::new(py, list)?.into_any()
         }
         Value::String(text) | Value::Datetime(text) => text.into_pyobject(py)?.into_any(),
         Value::Integer(number) => number.into_pyobject(py)?.into_any(),

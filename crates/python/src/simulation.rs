@@ -218,17 +218,17 @@ impl Simulation {
     /// The view of displacements [m], (nodes, 3): read-only, without a copy.
     #[getter]
     fn displacement<'py>(slf: Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let own = slf.get();
-        if own.quick(|running| running.world.device().is_some())? {
-            own.work(slf.py(), |running, _| running.evaluate())?;
+        let simulation = slf.get();
+        if simulation.quick(|running| running.world.device().is_some())? {
+            simulation.work(slf.py(), |running, _| running.evaluate())?;
         }
         enum Place {
             Single(usize, usize),
             Double(usize, usize),
         }
-        let place = own.quick(|running| match running.displacement() {
-            Reals::Single(all) => Place::Single(all.as_ptr().expose_provenance(), all.len()),
-            Reals::Double(all) => Place::Double(all.as_ptr().expose_provenance(), all.len()),
+        let place = simulation.quick(|running| match running.displacement() {
+            Reals::Single(values) => Place::Single(values.as_ptr().expose_provenance(), values.len()),
+            Reals::Double(values) => Place::Double(values.as_ptr().expose_provenance(), values.len()),
         })?;
         Ok(match place {
             Place::Single(address, nodes) => view::<f32>(slf.into_any(), address, nodes).into_any(),
@@ -281,7 +281,7 @@ impl Simulation {
     fn enclosed(&self, py: Python<'_>, constraint: String) -> PyResult<Option<[f64; 2]>> {
         self.work(py, move |running, _| {
             let found = running.live.simulation.frame()?.enclosed(&constraint);
-            Ok(found.map(|own| [own.volume, own.pressure]))
+            Ok(found.map(|cavity| [cavity.volume, cavity.pressure]))
         })
     }
 
@@ -299,7 +299,9 @@ impl Simulation {
 
     /// Names and units of the sampled columns.
     fn columns(&self) -> Result<Vec<(String, &'static str)>, Trouble> {
-        self.quick(|running| running.live.columns().iter().map(|own| (own.name.clone(), own.unit)).collect())
+        self.quick(|running| {
+            running.live.columns().iter().map(|column| (column.name.clone(), column.unit)).collect()
+        })
     }
 
     /// The sample of the instant.
@@ -498,8 +500,8 @@ fn view<T: numpy::Element>(
     // holds a reference to the simulation, and is not writeable before anybody sees it. A thread that reads
     // it during a step may see two instants mixed, which the documentation says.
     unsafe {
-        let own = ArrayView2::from_shape_ptr((nodes, 3), data);
-        let array = PyArray2::borrow_from_array(&own, simulation);
+        let rows = ArrayView2::from_shape_ptr((nodes, 3), data);
+        let array = PyArray2::borrow_from_array(&rows, simulation);
         array.readwrite().make_nonwriteable();
         array
     }

@@ -63,7 +63,7 @@ impl State {
                 let bytes = state.encode().map_err(|error| Trouble::Internal(error.to_string()))?;
                 bytes.into_iter().map(Into::into).collect()
             }
-            Snapshot::Bytes(bytes) => bytes.iter().map(|own| own.as_slice().into()).collect(),
+            Snapshot::Bytes(bytes) => bytes.iter().map(|part| part.as_slice().into()).collect(),
         };
         Ok((bytes, self.time, self.steps, self.displacement.to_vec()))
     }

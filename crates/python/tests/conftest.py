@@ -47,11 +47,11 @@ def scene() -> pliant.Scene:
 def any_solver(request: pytest.FixtureRequest) -> pliant.Scene:
     """The cube by each solver."""
     solver, _, precision = request.param.partition(" ")
-    own = cube(**{"run.solver": solver})
+    scene = cube(**{"run.solver": solver})
     if precision:
-        own["run.precision"] = precision
+        scene["run.precision"] = precision
     if solver == "implicit":
-        own["run.step"] = 0.01
+        scene["run.step"] = 0.01
     if solver == "quasi-static":
-        own["run.load-steps"] = 8
-    return own
+        scene["run.load-steps"] = 8
+    return scene

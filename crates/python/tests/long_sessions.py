@@ -76,15 +76,15 @@ def scene(name: str) -> pliant.Scene:
     """The scene of a session."""
     kind, barrier = KINDS[name.partition(",")[0]], name.endswith("barrier")
     run = {"solver": "implicit", "step": LOOK} if barrier else {}
-    own = pliant.Scene(until=1e6, gravity=(0, 0, -9.81), run={"threads": 1, **run})
-    own.law["tissue"] = {"type": "neo-hookean", "young-modulus": kind.young, "poisson-ratio": 0.4}
+    scene = pliant.Scene(until=1e6, gravity=(0, 0, -9.81), run={"threads": 1, **run})
+    scene.law["tissue"] = {"type": "neo-hookean", "young-modulus": kind.young, "poisson-ratio": 0.4}
     for body, (mesh, fixed, more) in kind.bodies.items():
-        own.body[body] = {"mesh": mesh, "law": "tissue", "density": 1000.0, "damping": 20.0, **more}
-        own.constraint[body] = {"type": "fix", "body": body, "nodes": {"union": [{"set": part} for part in fixed]}}
-    own.tool["tool"] = kind.tool
+        scene.body[body] = {"mesh": mesh, "law": "tissue", "density": 1000.0, "damping": 20.0, **more}
+        scene.constraint[body] = {"type": "fix", "body": body, "nodes": {"union": [{"set": part} for part in fixed]}}
+    scene.tool["tool"] = kind.tool
     for pair in kind.pairs:
-        own.contact[pair.replace(" ", "-")] = {"between": pair.split(), "friction": 0.3, **({"barrier-distance": 5e-4} if barrier else {})}
-    return own
+        scene.contact[pair.replace(" ", "-")] = {"between": pair.split(), "friction": 0.3, **({"barrier-distance": 5e-4} if barrier else {})}
+    return scene
 
 
 @dataclass
@@ -124,7 +124,7 @@ class Row:
         return self.faults + [f"memory grew from {first:.1f} to {most:.1f} MB"] * (most > GROWTH * first)
 
     def __str__(self) -> str:
-        memory = "".join(f"{own:7.1f}" for own in self.memory) or "       not judged yet"
+        memory = "".join(f"{size:7.1f}" for size in self.memory) or "       not judged yet"
         heard = ", ".join(f"{count} {kind}" for kind, count in sorted(self.heard.items())) or "none"
         numbers = f"{self.steps:9}{self.simulated:9.1f}{self.touching / max(self.looks, 1):9.0%}{1e3 * self.longest:11.0f}"
         return f"{self.name:20}{numbers} {memory}  {'FAIL' if self.verdict() else 'PASS'}  {heard}"
@@ -184,7 +184,7 @@ class Session:
 
 def work(name: str, seed: int, seconds: float, hours: float, pipe: Connection) -> None:
     """A session in its process; its row goes out every second."""
-    begun = told = time.monotonic()
+    begun = sent = time.monotonic()
     session = Session(name, seed)
     row = session.row
     warnings.simplefilter("always")
@@ -200,8 +200,8 @@ def work(name: str, seed: int, seconds: float, hours: float, pipe: Connection) -
         except Exception as error:
             row.faults.append(f"{error!r:.500}")
         part = max((time.monotonic() - begun) / seconds, row.simulated / (3600.0 * hours))
-        if time.monotonic() > told + 1.0 or part >= 1.0 or row.faults:
-            told = time.monotonic()
+        if time.monotonic() > sent + 1.0 or part >= 1.0 or row.faults:
+            sent = time.monotonic()
             if part > 0.1 and row.looks > WARM:
                 row.sample()
             pipe.send(row)
@@ -216,7 +216,7 @@ def main() -> None:
     args = parser.parse_args()
     seconds = args.seconds or (60.0 if args.hours == np.inf else np.inf)
     spawn = multiprocessing.get_context("spawn")
-    rows, running, told = {name: Row(name) for name in SESSIONS}, {}, dict.fromkeys(SESSIONS, time.monotonic())
+    rows, running, heard = {name: Row(name) for name in SESSIONS}, {}, dict.fromkeys(SESSIONS, time.monotonic())
     for name in rows:
         out, pipe = spawn.Pipe(duplex=False)
         running[name] = spawn.Process(target=work, args=(name, args.seed, seconds, args.hours, pipe)), out
@@ -228,8 +228,8 @@ def main() -> None:
         for name, (process, out) in list(running.items()):
             try:
                 while out.poll(0.1):
-                    rows[name], told[name] = out.recv(), time.monotonic()
-                if time.monotonic() > told[name] + HANGS:
+                    rows[name], heard[name] = out.recv(), time.monotonic()
+                if time.monotonic() > heard[name] + HANGS:
                     process.kill()
             except EOFError:
                 process.join()

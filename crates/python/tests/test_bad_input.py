@@ -19,7 +19,7 @@ def test_a_scene_tells_all_its_mistakes_with_lines() -> None:
         pliant.Scene.from_toml(text, name="mine.toml").build()
     found = caught.value.diagnostics
     assert len(found) >= 2 and isinstance(caught.value, ValueError)
-    assert any(own.key == "law.tissue.young-modulos" and own.line for own in found), found
+    assert any(diagnostic.key == "law.tissue.young-modulos" and diagnostic.line for diagnostic in found), found
     assert "young-modulos" in str(caught.value) and "mine.toml" in str(caught.value)
     again = pickle.loads(pickle.dumps(caught.value))
     assert str(again) == str(caught.value) and again.diagnostics == found
@@ -172,7 +172,7 @@ def test_a_model_warns_once_per_text() -> None:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         scene.build()
-    texts = [str(own.message) for own in caught if issubclass(own.category, pliant.PliantWarning)]
+    texts = [str(warning.message) for warning in caught if issubclass(warning.category, pliant.PliantWarning)]
     assert texts and len(texts) == len(set(texts))
 
 

@@ -155,7 +155,7 @@ def test_wedges_and_pyramids_become_tetrahedra() -> None:
     assert set(mesh.cells) == {"tetra"} and abs(volume(mesh) - 7 / 3) < 1e-12
     assert {label: int((mesh.cell_data["label"] == label).sum()) for label in (1, 2, 3)} == {1: 6, 2: 6, 3: 2}
     meshio = pytest.importorskip("meshio")
-    blocks = [(kind, np.array(own)) for kind, own in cells.items()]
+    blocks = [(kind, np.array(corners)) for kind, corners in cells.items()]
     labels = [np.array([1.0, 1.0]), np.array([2.0]), np.array([3.0])]
     back = Mesh.from_meshio(meshio.Mesh(points, blocks, cell_data={"label": labels}))
     assert same(mesh, back) and np.array_equal(mesh.cell_data["label"], back.cell_data["label"])
@@ -163,7 +163,7 @@ def test_wedges_and_pyramids_become_tetrahedra() -> None:
         Mesh.from_meshio(meshio.Mesh(np.zeros((10, 3)), [("tetra10", np.arange(10)[None])]))
     pyvista = pytest.importorskip("pyvista")
     kinds = {"wedge": 13, "hexahedron": 12, "pyramid": 14}
-    grid = pyvista.UnstructuredGrid({kinds[kind]: np.array(own) for kind, own in cells.items()}, points)
+    grid = pyvista.UnstructuredGrid({kinds[kind]: np.array(corners) for kind, corners in cells.items()}, points)
     assert abs(volume(Mesh.from_pyvista(grid)) - 7 / 3) < 1e-12
     voxels = Mesh.from_pyvista(pyvista.ImageData(dimensions=(3, 2, 2)))
     assert len(voxels.cells["hexahedron"]) == 2
@@ -201,7 +201,7 @@ def alike(a: Mesh, b: Mesh) -> None:
 
 def told_of_cells(mesh: Mesh) -> dict[tuple[str | int, ...], list[float]]:
     """Label and fibre of each cell, by its kind and nodes: Gmsh's files order cells by their sets."""
-    cells = [(kind, *nodes.tolist()) for kind, own in mesh.cells.items() for nodes in own]
+    cells = [(kind, *nodes.tolist()) for kind, corners in mesh.cells.items() for nodes in corners]
     values = np.column_stack([mesh.cell_data["label"], mesh.cell_data["fibre"].reshape(len(cells), 3)])
     return dict(zip(cells, np.nan_to_num(values, nan=-1.0).tolist(), strict=True))
 
@@ -233,7 +233,7 @@ def test_nothing_of_a_mesh_is_lost_on_the_way(tmp_path: Path) -> None:
 def test_wedges_keep_labels_and_sets_of_cells() -> None:
     meshio = pytest.importorskip("meshio")
     points, cells = column()
-    blocks = [(kind, np.array(own)) for kind, own in cells.items()]
+    blocks = [(kind, np.array(corners)) for kind, corners in cells.items()]
     sets = {"top": [np.empty(0, int), np.array([0]), np.array([0])]}
     mesh = Mesh.from_meshio(meshio.Mesh(points, blocks, cell_sets=sets, point_sets={"foot": np.arange(4)}))
     assert len(mesh.cell_sets["top"]) == 8 and {*range(4)} == {*mesh.point_sets["foot"].tolist()}
@@ -244,7 +244,7 @@ def test_labels_of_images_are_rounded_as_the_mesher_does() -> None:
     values = np.zeros((12, 12, 12))
     values[2:6, 2:10, 2:10], values[6:10, 2:10, 2:10] = 5, 6.99999
     image = Image(values, np.diag([2e-3] * 3 + [1.0]))
-    assert {label: own.voxels for label, own in image.labels().items()} == {5: 256, 7: 256}
+    assert {label: part.voxels for label, part in image.labels().items()} == {5: 256, 7: 256}
     assert set(np.unique(Mesh.of_image(image, [5, 7], edge=4e-3).cell_data["label"])) == {5.0, 7.0}
     with pytest.raises(pliant.MeshError, match=r"6\.9"):
         Image(np.where(values > 6, 6.9, values), image.affine).labels()
@@ -256,7 +256,7 @@ def test_labels_are_any_whole_numbers(labels: object) -> None:
     values[2:6, 2:10, 2:10], values[6:10, 2:10, 2:10] = 5, 7
     mesh = Mesh.of_image(Image(values, np.diag([2e-3] * 3 + [1.0])), labels, edge=4e-3)
     assert set(np.unique(mesh.cell_data["label"])) == {
-        float(own) for own in np.atleast_1d(list(np.ravel(labels)) if not isinstance(labels, set) else list(labels))
+        float(label) for label in np.atleast_1d(list(np.ravel(labels)) if not isinstance(labels, set) else list(labels))
     }
 
 

@@ -91,15 +91,15 @@ def meshes(draw: hypothesis.strategies.DrawFn) -> pliant.Mesh:
     data = {name: random.random((total, draw(st.sampled_from([1, 3, 9])))) for name in draw(st.lists(NAMES, max_size=2, unique=True))}
     data |= {"label": random.integers(-3, 4, total)} if draw(st.booleans()) else {}
     if len(kinds) > 1:
-        for own in data.values():
-            if own.dtype == float and draw(st.booleans()):
-                own[: counts[0]] = np.nan
+        for values in data.values():
+            if values.dtype == float and draw(st.booleans()):
+                values[: counts[0]] = np.nan
     subset = lambda count: np.flatnonzero(random.random(count) < 0.5)  # noqa: E731
     point_sets = {name: subset(12) for name in draw(st.lists(NAMES, max_size=2, unique=True))}
     cell_sets = {name: subset(total) for name in draw(st.lists(NAMES, max_size=2, unique=True))}
     names = draw(st.dictionaries(st.integers(-5, 5), NAMES, max_size=3))
-    own = {"point_data": {name: random.random((12, 3)) for name in data if name != "label"}, "cell_data": data}
-    return pliant.Mesh(random.random((12, 3)), cells, **own, point_sets=point_sets, cell_sets=cell_sets, label_names=names)
+    arrays = {"point_data": {name: random.random((12, 3)) for name in data if name != "label"}, "cell_data": data}
+    return pliant.Mesh(random.random((12, 3)), cells, **arrays, point_sets=point_sets, cell_sets=cell_sets, label_names=names)
 
 
 @settings(max_examples=100, deadline=None)

@@ -64,13 +64,13 @@ def test_frames_of_runs(outputs: Path) -> None:
     frames = sorted(outputs.glob("*/*.vtu"))
     assert {frame.parent.name for frame in frames} == {"all", "cells", "curved"}
     for frame in frames:
-        own, by_meshio, by_vtk = Mesh.read(frame), meshio.read(frame), pyvista.read(frame)
-        assert np.allclose(by_meshio.points, own.points) and np.allclose(by_vtk.points, own.points)
-        assert sum(len(block.data) for block in by_meshio.cells) == by_vtk.n_cells == sum(map(len, own.cells.values()))
-        for name, values in own.point_data.items():
+        mesh, by_meshio, by_vtk = Mesh.read(frame), meshio.read(frame), pyvista.read(frame)
+        assert np.allclose(by_meshio.points, mesh.points) and np.allclose(by_vtk.points, mesh.points)
+        assert sum(len(block.data) for block in by_meshio.cells) == by_vtk.n_cells == sum(map(len, mesh.cells.values()))
+        for name, values in mesh.point_data.items():
             assert np.allclose(by_meshio.point_data[name].ravel(), values.ravel(), equal_nan=True), name
             assert np.allclose(by_vtk.point_data[name].ravel(), values.ravel(), equal_nan=True), name
-        assert {*own.cell_data} <= {*by_meshio.cell_data} and {*own.cell_data} <= {*by_vtk.cell_data.keys()}
+        assert {*mesh.cell_data} <= {*by_meshio.cell_data} and {*mesh.cell_data} <= {*by_vtk.cell_data.keys()}
     reader = pyvista.get_reader(outputs / "all.pvd")
     assert len(reader.time_values) == 3 and reader.time_values[-1] == pytest.approx(0.01, rel=0.2)
     assert reader.read()[0].n_points == Mesh.read(frames[0]).points.shape[0]
@@ -91,10 +91,10 @@ def test_names_of_labels_and_bodies(meshes: Path, outputs: Path) -> None:
 
 def test_meshes(meshes: Path) -> None:
     for file in ("tets.vtu", "tets.msh", "hexes.vtu", "surface.vtu", "surface.msh", "surface.stl", "surface.ply", "surface.obj"):
-        own, by_meshio, by_vtk = Mesh.read(meshes / file), meshio.read(meshes / file), pyvista.read(meshes / file)
-        cells = sum(map(len, own.cells.values()))
+        mesh, by_meshio, by_vtk = Mesh.read(meshes / file), meshio.read(meshes / file), pyvista.read(meshes / file)
+        cells = sum(map(len, mesh.cells.values()))
         assert sum(len(block.data) for block in by_meshio.cells) == by_vtk.n_cells == cells, file
-        low, high = own.points.min(axis=0), own.points.max(axis=0)
+        low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
         assert np.allclose([by_meshio.points.min(axis=0), by_meshio.points.max(axis=0)], [low, high], atol=1e-7), file
         assert np.allclose([by_vtk.points.min(axis=0), by_vtk.points.max(axis=0)], [low, high], atol=1e-7), file
     for file in ("surface.stl", "surface.ply", "surface.obj"):

@@ -178,18 +178,18 @@ def test_workers_of_another_version() -> None:
 
 def test_files_of_a_scene_travel(tmp_path: Path) -> None:
     pliant.Mesh.block([0.1, 0.1, 0.1], edge=0.05).write(tmp_path / "block.vtu")
-    own = scene()
-    own.body["cube"]["mesh"] = {"file": "block.vtu"}
-    own.folder = str(tmp_path)
-    bundle = _bundle(own, [{"scene.until": 0.01}], ["scene.until"], None, 1, None)
+    cube_scene = scene()
+    cube_scene.body["cube"]["mesh"] = {"file": "block.vtu"}
+    cube_scene.folder = str(tmp_path)
+    bundle = _bundle(cube_scene, [{"scene.until": 0.01}], ["scene.until"], None, 1, None)
     assert list(bundle.files) == ["block.vtu"]
     row = _run(bundle, 0)
     assert row["status"] == "done", row
 
 
 def test_parts_of_the_command_line_are_put_together(tmp_path: Path, expected: list[dict[str, Any]]) -> None:
-    own = scene()
-    own.save(tmp_path / "scene.toml")
+    cube_scene = scene()
+    cube_scene.save(tmp_path / "scene.toml")
     sets = [f"--set={key}={','.join(str(value) for value in values)}" for key, values in VALUES.items() if "young" in key]
     for part in ("1/2", "2/2"):
         words = ["sweep", str(tmp_path / "scene.toml"), *sets, "--set=law.tissue.poisson-ratio=0.2", "--out", str(tmp_path), "--part", part]

@@ -21,10 +21,10 @@ def code_of(function: Any) -> str:
     >>> code_of(lambda r: r + 1) == code_of(lambda r: r + 1), code_of(lambda r: r + 1) == code_of(lambda r: r + 2)
     (True, False)
     """
-    own = hashlib.sha256()
+    digest = hashlib.sha256()
     for part in _parts(function, set()):
-        own.update(len(part).to_bytes(8, "little") + part)
-    return own.hexdigest()
+        digest.update(len(part).to_bytes(8, "little") + part)
+    return digest.hexdigest()
 
 
 def _parts(value: Any, seen: set[int]) -> list[bytes]:
@@ -34,29 +34,29 @@ def _parts(value: Any, seen: set[int]) -> list[bytes]:
     if isinstance(value, types.FunctionType):
         seen.add(id(value))
         parts = _of_code(value.__code__, seen)
-        for own in (value.__defaults__, value.__kwdefaults__):
-            parts += _parts(own, seen)
+        for defaults in (value.__defaults__, value.__kwdefaults__):
+            parts += _parts(defaults, seen)
         for cell in value.__closure__ or ():
             parts += _parts(cell.cell_contents, seen) if _filled(cell) else []
         for name in sorted(_names(value.__code__)):
-            own = value.__globals__.get(name)
-            if isinstance(own, types.FunctionType) and own.__module__ != value.__module__:
-                parts.append(f"{name}={own.__module__}.{own.__qualname__}".encode())
-            elif own is not None and not isinstance(own, (types.ModuleType, type)):
-                parts += [name.encode(), *_parts(own, seen)]
+            named = value.__globals__.get(name)
+            if isinstance(named, types.FunctionType) and named.__module__ != value.__module__:
+                parts.append(f"{name}={named.__module__}.{named.__qualname__}".encode())
+            elif named is not None and not isinstance(named, (types.ModuleType, type)):
+                parts += [name.encode(), *_parts(named, seen)]
         return parts
     if isinstance(value, types.MethodType):
         return _parts(value.__func__, seen) + _parts(value.__self__, seen)
     if isinstance(value, functools.partial):
-        return [part for own in (value.func, value.args, value.keywords) for part in _parts(own, seen)]
+        return [part for member in (value.func, value.args, value.keywords) for part in _parts(member, seen)]
     if isinstance(value, np.ndarray):
         return [str((value.dtype, value.shape)).encode(), value.tobytes()]
     if isinstance(value, Mapping):
-        return [part for key, own in value.items() for part in [repr(key).encode(), *_parts(own, seen)]]
+        return [part for key, entry in value.items() for part in [repr(key).encode(), *_parts(entry, seen)]]
     if isinstance(value, (set, frozenset)):
         return [repr(sorted(map(repr, value))).encode()]
     if isinstance(value, (list, tuple)):
-        return [part for own in value for part in [b",", *_parts(own, seen)]]
+        return [part for element in value for part in [b",", *_parts(element, seen)]]
     if value is None or isinstance(value, (bool, int, float, complex, str, bytes, np.generic)):
         return [repr(value).encode()]
     kind = type(value)
@@ -73,15 +73,15 @@ def _parts(value: Any, seen: set[int]) -> list[bytes]:
 
 def _of_code(code: types.CodeType, seen: set[int]) -> list[bytes]:
     parts = [code.co_code, repr(code.co_names).encode(), repr(code.co_varnames).encode()]
-    for own in code.co_consts:
-        parts += _of_code(own, seen) if isinstance(own, types.CodeType) else _parts(own, seen)
+    for constant in code.co_consts:
+        parts += _of_code(constant, seen) if isinstance(constant, types.CodeType) else _parts(constant, seen)
     return parts
 
 
 def _names(code: types.CodeType) -> set[str]:
     """Names of globals in a code and in the functions within it."""
-    inner = [own for own in code.co_consts if isinstance(own, types.CodeType)]
-    return set(code.co_names).union(*(_names(own) for own in inner))
+    inner = [constant for constant in code.co_consts if isinstance(constant, types.CodeType)]
+    return set(code.co_names).union(*(_names(nested) for nested in inner))
 
 
 def _filled(cell: types.CellType) -> bool:

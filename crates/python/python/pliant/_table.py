@@ -16,10 +16,10 @@ class Table:
 
     def to_dict(self) -> dict[str, Any]:
         """The table as it stands in a file."""
-        own: dict[str, Any] = {} if self._type is None else {"type": self._type}
+        table: dict[str, Any] = {} if self._type is None else {"type": self._type}
         assert is_dataclass(self)
         for field in fields(self):
             value = getattr(self, field.name)
             if value is not None:
-                own[self._keys[field.name]] = value
-        return own
+                table[self._keys[field.name]] = value
+        return table

@@ -19,34 +19,34 @@ def _key(name: str) -> str:
     return name if _BARE.fullmatch(name) else json.dumps(name)
 
 
-def value(own: Any) -> str:
+def value(content: Any) -> str:
     """A value as it stands behind ``=``.
 
     >>> value({"size": [0.1, 0.2], "kind": "tets"})
     '{ size = [0.1, 0.2], kind = "tets" }'
     """
-    if isinstance(own, (bool, np.bool_)):
-        return "true" if own else "false"
-    if isinstance(own, (int, np.integer)):
-        return str(int(own))
-    if isinstance(own, (float, np.floating)):
-        number = float(own)
+    if isinstance(content, (bool, np.bool_)):
+        return "true" if content else "false"
+    if isinstance(content, (int, np.integer)):
+        return str(int(content))
+    if isinstance(content, (float, np.floating)):
+        number = float(content)
         if math.isnan(number):
             return "nan"
         if math.isinf(number):
             return "inf" if number > 0 else "-inf"
         text = repr(number)
         return text if any(mark in text for mark in ".e") else text + ".0"
-    if isinstance(own, str):
-        return json.dumps(own, ensure_ascii=False).replace("\x7f", "\\u007f")
-    if isinstance(own, np.ndarray):
-        return value(own.tolist())
-    if isinstance(own, Mapping):
-        inner = ", ".join(f"{_key(name)} = {value(item)}" for name, item in own.items())
+    if isinstance(content, str):
+        return json.dumps(content, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(content, np.ndarray):
+        return value(content.tolist())
+    if isinstance(content, Mapping):
+        inner = ", ".join(f"{_key(name)} = {value(item)}" for name, item in content.items())
         return f"{{ {inner} }}" if inner else "{}"
-    if isinstance(own, Sequence):
-        return "[" + ", ".join(value(item) for item in own) + "]"
-    raise TypeError(f"a scene holds numbers, texts, lists and tables, not {type(own).__name__}")
+    if isinstance(content, Sequence):
+        return "[" + ", ".join(value(item) for item in content) + "]"
+    raise TypeError(f"a scene holds numbers, texts, lists and tables, not {type(content).__name__}")
 
 
 def document(data: Mapping[str, Any], named: Sequence[str]) -> str:
@@ -54,7 +54,7 @@ def document(data: Mapping[str, Any], named: Sequence[str]) -> str:
     parts = []
     for kind, table in data.items():
         if kind in named:
-            parts += [_section(f"{kind}.{_key(name)}", own) for name, own in table.items()]
+            parts += [_section(f"{kind}.{_key(name)}", entry) for name, entry in table.items()]
         elif isinstance(table, Mapping):
             parts.append(_section(kind, table))
         else:
@@ -65,5 +65,5 @@ def document(data: Mapping[str, Any], named: Sequence[str]) -> str:
 def _section(header: str, table: Any) -> str:
     if not isinstance(table, Mapping):
         raise TypeError(f"`{header}` must be a table, not {type(table).__name__}")
-    lines = [f"{_key(name)} = {value(own)}\n" for name, own in table.items()]
+    lines = [f"{_key(name)} = {value(entry)}\n" for name, entry in table.items()]
     return f"[{header}]\n" + "".join(lines)

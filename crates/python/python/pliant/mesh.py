@@ -91,13 +91,13 @@ class Mesh:
                 if len(blocks) == 1 or not np.isnan(part).all():
                     by_cell.append((kind, name, part))
                 first += len(corners)
-        sets = [(name, indices(own, f"points of the set `{name}`", (None,), count)) for name, own in (point_sets or {}).items()]
+        sets = [(name, indices(members, f"points of the set `{name}`", (None,), count)) for name, members in (point_sets or {}).items()]
         of_cells = []
         for name, members in (cell_sets or {}).items():
-            own, first = indices(members, f"cells of the set `{name}`", (None,), total), 0
+            chosen, first = indices(members, f"cells of the set `{name}`", (None,), total), 0
             for kind, corners in blocks:
-                here = own[(own >= first) & (own < first + len(corners))] - np.uint32(first)
-                if len(here) or not (len(own) or first):
+                here = chosen[(chosen >= first) & (chosen < first + len(corners))] - np.uint32(first)
+                if len(here) or not (len(chosen) or first):
                     of_cells.append((kind, name, here))
                 first += len(corners)
         names = {operator.index(number): str(name) for number, name in (label_names or {}).items()}
@@ -112,35 +112,35 @@ class Mesh:
     @property
     def points(self) -> NDArray[np.float64]:
         """Places [m], (n, 3)."""
-        own: NDArray[np.float64] = self._kept("_points", lambda: fixed(self._own.points()))
-        return own
+        points: NDArray[np.float64] = self._kept("_points", lambda: fixed(self._own.points()))
+        return points
 
     @property
     def cells(self) -> Mapping[str, NDArray[np.uint32]]:
         """Corners of the cells by kind."""
         make = lambda: MappingProxyType({k: fixed(v) for k, v in self._own.cells().items()})  # noqa: E731
-        own: Mapping[str, NDArray[np.uint32]] = self._kept("_cells", make)
-        return own
+        cells: Mapping[str, NDArray[np.uint32]] = self._kept("_cells", make)
+        return cells
 
     @property
     def point_data(self) -> Mapping[str, NDArray[np.float64]]:
         """Values of points by name: (n,), (n, 3) or (n, 3, 3)."""
         make = lambda: MappingProxyType({k: fixed(_shaped(v)) for k, v in self._own.point_data().items()})  # noqa: E731
-        own: Mapping[str, NDArray[np.float64]] = self._kept("_point_data", make)
-        return own
+        data: Mapping[str, NDArray[np.float64]] = self._kept("_point_data", make)
+        return data
 
     @property
     def cell_data(self) -> Mapping[str, NDArray[np.float64]]:
         """Values of cells by name, one kind of cells after another; NaN where a kind has no values."""
-        own: Mapping[str, NDArray[np.float64]] = self._kept("_cell_data", self._gather)
-        return own
+        data: Mapping[str, NDArray[np.float64]] = self._kept("_cell_data", self._gather)
+        return data
 
     @property
     def point_sets(self) -> Mapping[str, NDArray[np.uint32]]:
         """Named sets of points, and the points of named sets of cells."""
         make = lambda: MappingProxyType({k: fixed(v) for k, v in self._own.point_sets(True).items()})  # noqa: E731
-        own: Mapping[str, NDArray[np.uint32]] = self._kept("_point_sets", make)
-        return own
+        sets: Mapping[str, NDArray[np.uint32]] = self._kept("_point_sets", make)
+        return sets
 
     @property
     def cell_sets(self) -> Mapping[str, NDArray[np.uint32]]:
@@ -154,8 +154,8 @@ class Mesh:
                 sets.setdefault(name, []).append(members + np.uint32(first[kind]))
             return MappingProxyType({name: fixed(np.concatenate(parts)) for name, parts in sets.items()})
 
-        own: Mapping[str, NDArray[np.uint32]] = self._kept("_cell_sets", make)
-        return own
+        found: Mapping[str, NDArray[np.uint32]] = self._kept("_cell_sets", make)
+        return found
 
     @property
     def label_names(self) -> dict[int, str]:
@@ -173,9 +173,9 @@ class Mesh:
         for name, kind, values in found:
             by_name.setdefault(name, {})[kind] = values
         gathered = {}
-        for name, own in by_name.items():
-            columns = next(iter(own.values())).shape[1]
-            parts = [own.get(kind, np.full((len(corners), columns), np.nan)) for kind, corners in self.cells.items()]
+        for name, by_kind in by_name.items():
+            columns = next(iter(by_kind.values())).shape[1]
+            parts = [by_kind.get(kind, np.full((len(corners), columns), np.nan)) for kind, corners in self.cells.items()]
             gathered[name] = fixed(_shaped(np.concatenate(parts)))
         return MappingProxyType(gathered)
 
@@ -258,8 +258,8 @@ class Mesh:
         clean: Mapping[str, Any] | None = None,
     ) -> Mesh:
         """Cells of `edge` [m] in the voxels with the given labels of an image. Cell data ``label`` holds the label of each cell."""
-        own = [labels] if isinstance(labels, (int, np.integer)) else list(labels)
-        return image._mesh(own, edge, kind, clean)
+        chosen = [labels] if isinstance(labels, (int, np.integer)) else list(labels)
+        return image._mesh(chosen, edge, kind, clean)
 
     def of_surface(self, edge: float, *, kind: str = "tets") -> Mesh:
         """Cells of `edge` [m] inside the closed surface of this mesh."""
@@ -325,7 +325,7 @@ class Mesh:
             cells[kind] = np.concatenate([cells[kind], corners]) if kind in cells else corners
             order.append((kind, np.flatnonzero(grid.celltypes == number)))
         # Cells of one kind stand together, as the mesh has them.
-        at = np.concatenate([own for kind in cells for word, own in order if word == kind]) if order else np.empty(0, int)
+        at = np.concatenate([rows for kind in cells for word, rows in order if word == kind]) if order else np.empty(0, int)
         by_cell = {name: np.asarray(grid.cell_data[name])[at] for name in grid.cell_data}
         by_point = {name: np.asarray(grid.point_data[name]) for name in grid.point_data}
         return cls._with_sets(grid.points, cells, by_point, by_cell, {}, {}, _names_of(names), scale)
@@ -344,10 +344,10 @@ class Mesh:
     ) -> Mesh:
         """A mesh whose arrays ``set:NAME`` are sets."""
         for data, sets in ((point_data, point_sets), (cell_data, cell_sets)):
-            for name in [own for own in data if own.startswith(_SET) and data[own].ndim == 1]:
+            for name in [key for key in data if key.startswith(_SET) and data[key].ndim == 1]:
                 sets[name.removeprefix(_SET)] = np.flatnonzero(data.pop(name))
-        own: dict[str, Any] = {"point_data": point_data, "cell_data": cell_data, "point_sets": point_sets, "cell_sets": cell_sets}
-        return cls(points, cells, **own, label_names=names, scale=scale)
+        arrays: dict[str, Any] = {"point_data": point_data, "cell_data": cell_data, "point_sets": point_sets, "cell_sets": cell_sets}
+        return cls(points, cells, **arrays, label_names=names, scale=scale)
 
     def to_meshio(self) -> meshio.Mesh:
         """A copy for meshio, with data, sets, and names of labels as the field data ``label-names``."""
@@ -364,8 +364,8 @@ class Mesh:
             none = [np.empty(0, dtype=np.uint32) for _ in blocks]
             cell_sets.setdefault(name, none)[list(self.cells).index(kind)] = members
         names = {_NAMES: _bytes_of(self.label_names)} if self.label_names else {}
-        own: dict[str, Any] = {"point_data": data, "cell_data": cell_data, "point_sets": point_sets, "cell_sets": cell_sets}
-        return mio.Mesh(self.points.copy(), blocks, **own, field_data=names)
+        arrays: dict[str, Any] = {"point_data": data, "cell_data": cell_data, "point_sets": point_sets, "cell_sets": cell_sets}
+        return mio.Mesh(self.points.copy(), blocks, **arrays, field_data=names)
 
     @classmethod
     def from_meshio(cls, mesh: Any, *, scale: float = 1.0) -> Mesh:
@@ -383,7 +383,7 @@ class Mesh:
         for name, parts in mesh.cell_sets.items():
             here = [np.asarray(parts[k], dtype=np.int64) + first[k] for k in order if parts[k] is not None]
             cell_sets[name] = np.concatenate(here) if here else np.empty(0, dtype=np.int64)
-        by_point, point_sets = {name: np.asarray(own) for name, own in mesh.point_data.items()}, dict(mesh.point_sets)
+        by_point, point_sets = {name: np.asarray(values) for name, values in mesh.point_data.items()}, dict(mesh.point_sets)
         _of_gmsh(by_cell, by_point, cell_sets)
         return cls._with_sets(mesh.points, cells, by_point, by_cell, point_sets, cell_sets, _names_of(mesh.field_data.get(_NAMES)), scale)
 
@@ -393,20 +393,20 @@ class Mesh:
 
     def _repr_html_(self) -> str:
         low, high = self.points.min(axis=0), self.points.max(axis=0)
-        rows: dict[str, Any] = {"points": len(self.points), **{kind: len(own) for kind, own in self.cells.items()}}
+        rows: dict[str, Any] = {"points": len(self.points), **{kind: len(corners) for kind, corners in self.cells.items()}}
         rows["size [m]"] = " × ".join(f"{x:.4g}" for x in high - low)
         return _table("Mesh", rows)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        cells = {kind: np.array(own) for kind, own in self.cells.items()}
-        data = [{name: own.reshape(len(own), -1) for name, own in all_data.items()} for all_data in (self.point_data, self.cell_data)]
-        sets = [self._own.point_sets(False), {name: np.array(own) for name, own in self.cell_sets.items()}]
+        cells = {kind: np.array(corners) for kind, corners in self.cells.items()}
+        data = [{name: values.reshape(len(values), -1) for name, values in all_data.items()} for all_data in (self.point_data, self.cell_data)]
+        sets = [self._own.point_sets(False), {name: np.array(members) for name, members in self.cell_sets.items()}]
         return _again, (np.array(self.points), cells, *data, *sets, self.label_names)
 
 
 def _again(points: Any, cells: Any, point_data: Any, cell_data: Any, point_sets: Any, cell_sets: Any, label_names: Any) -> Mesh:
-    own = {"point_data": point_data, "cell_data": cell_data, "point_sets": point_sets, "cell_sets": cell_sets}
-    return Mesh(points, cells, **own, label_names=label_names)
+    arrays = {"point_data": point_data, "cell_data": cell_data, "point_sets": point_sets, "cell_sets": cell_sets}
+    return Mesh(points, cells, **arrays, label_names=label_names)
 
 
 def _flat(values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -435,8 +435,8 @@ def _names_of(array: Any) -> dict[int, str]:
     """The names in such bytes, or in texts, as earlier versions wrote them."""
     if array is None:
         return {}
-    own = np.asarray(array).ravel()
-    texts = own.astype(np.uint8).tobytes().decode(errors="replace").split("\0") if own.dtype.kind in "biu" else [str(text) for text in own]
+    entries = np.asarray(array).ravel()
+    texts = entries.astype(np.uint8).tobytes().decode(errors="replace").split("\0") if entries.dtype.kind in "biu" else [str(text) for text in entries]
     pairs = [text.partition(" ") for text in texts]
     return {int(number): name for number, _, name in pairs if name and number.lstrip("-").isdecimal()}
 
@@ -445,7 +445,7 @@ def _of_gmsh(cell_data: dict[str, NDArray[Any]], point_data: dict[str, NDArray[A
     """Makes labels of the physical groups that meshio reads, or of the geometrical entities without any, as the reader of files does."""
     groups, entities = cell_data.pop("gmsh:physical", None), cell_data.pop("gmsh:geometrical", None)
     for sets in (point_data, cell_sets):
-        for name in [own for own in sets if own.startswith("gmsh:")]:
+        for name in [key for key in sets if key.startswith("gmsh:")]:
             del sets[name]
     found = entities if groups is None else groups
     if found is not None and np.any(found):

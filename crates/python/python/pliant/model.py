@@ -78,14 +78,14 @@ class Model:
     @property
     def rest(self) -> NDArray[np.float64]:
         """Places of all nodes at rest [m], (nodes, 3), bodies one after another."""
-        own: NDArray[np.float64] = self._kept("_rest", lambda: fixed(self._own.rest()))
-        return own
+        places: NDArray[np.float64] = self._kept("_rest", lambda: fixed(self._own.rest()))
+        return places
 
     @property
     def mass(self) -> NDArray[np.float64]:
         """Masses of all nodes [kg], (nodes,)."""
-        own: NDArray[np.float64] = self._kept("_mass", lambda: fixed(self._own.mass()))
-        return own
+        masses: NDArray[np.float64] = self._kept("_mass", lambda: fixed(self._own.mass()))
+        return masses
 
     @property
     def step(self) -> float:
@@ -112,8 +112,8 @@ class Model:
                 all_bodies[name] = Body(name, slice(first, first + count), Mesh._of(mesh), fixed(given))
             return MappingProxyType(all_bodies)
 
-        own: Mapping[str, Body] = self._kept("_bodies", make)
-        return own
+        bodies: Mapping[str, Body] = self._kept("_bodies", make)
+        return bodies
 
     @property
     def constraints(self) -> list[str]:
@@ -246,7 +246,7 @@ class Model:
                 raise ValueError("a run in memory has no checkpoints and draws no file: give a folder `out`")
             return self._run_in_memory(until, each, threads, stop)
 
-        def told(time: float, end: float, wall: float) -> None:
+        def report(time: float, end: float, wall: float) -> None:
             if stop is not None:
                 stop.check()
             if each is not None:
@@ -254,7 +254,7 @@ class Model:
 
         try:
             all_options = {"until": until, "threads": threads, "force": False, "resume": False, "picture": False, **options}
-            text, time, energies = self._own.run(os.fspath(out), all_options, told if each or stop else None)
+            text, time, energies = self._own.run(os.fspath(out), all_options, report if each or stop else None)
         except KeyboardInterrupt as interrupt:
             if "checkpoint" in self._scene.run_table and hasattr(interrupt, "add_note"):
                 interrupt.add_note(f"`run({os.fspath(out)!r}, resume=True)` continues from the last checkpoint")
@@ -317,7 +317,7 @@ class Model:
             if known is None or table is None or isinstance(table, Mesh) or _get(known, "mesh") != table:
                 continue
             if not isinstance(table, Mapping) or any(
-                scene._given.get(own) is not self._scene._given.get(own) for own in _images_of(table) if isinstance(own, str)
+                scene._given.get(image) is not self._scene._given.get(image) for image in _images_of(table) if isinstance(image, str)
             ):
                 continue
             if isinstance(table, Mapping) and ("given" in table or "fix" in table or ("file" in table and "as" not in table)):

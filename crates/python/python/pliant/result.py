@@ -40,7 +40,7 @@ class History(Mapping[str, NDArray[np.float64]]):
     """
 
     def __init__(self, columns: Mapping[str, Sequence[float]], units: Mapping[str, str]) -> None:
-        self._columns = {name: np.asarray(own, dtype=np.float64) for name, own in columns.items()}
+        self._columns = {name: np.asarray(column, dtype=np.float64) for name, column in columns.items()}
         self.units = dict(units)
         self._fields: list[str] = []
 
@@ -59,15 +59,15 @@ class History(Mapping[str, NDArray[np.float64]]):
 
     def _add(self, time: float, row: Sequence[float], frames: Mapping[str, NDArray[np.float64]]) -> None:
         self._rows.append([time, *row])
-        for name, own in frames.items():
-            self._frames[name].append(own)
+        for name, frame in frames.items():
+            self._frames[name].append(frame)
         self._columns = {}
 
     def _whole(self) -> dict[str, NDArray[np.float64]]:
         if not self._columns and getattr(self, "_rows", None):
             table = np.array(self._rows, dtype=np.float64)
             self._columns = dict(zip(["time", *self._names], table.T, strict=True))
-            self._columns |= {name: np.array(own) for name, own in self._frames.items()}
+            self._columns |= {name: np.array(frames) for name, frames in self._frames.items()}
         return self._columns
 
     def __getitem__(self, name: str) -> NDArray[np.float64]:
@@ -85,16 +85,16 @@ class History(Mapping[str, NDArray[np.float64]]):
     def to_pandas(self) -> pandas.DataFrame:
         """A data frame of the columns, without recorded fields."""
         pd = _extra("pandas", "tables")
-        return pd.DataFrame({name: own for name, own in self._whole().items() if own.ndim == 1})
+        return pd.DataFrame({name: column for name, column in self._whole().items() if column.ndim == 1})
 
     def to_xarray(self) -> xarray.Dataset:
         """A data set over time, with units and recorded fields."""
         xr = _extra("xarray", "tables")
-        rest = {name: own for name, own in self._whole().items() if name != "time"}
+        rest = {name: column for name, column in self._whole().items() if name != "time"}
         data = {}
-        for name, own in rest.items():
-            dims = ("time", *(f"{name}_{k}" for k in range(1, own.ndim)))
-            data[name] = (dims, own, {"units": self.units.get(name, "")})
+        for name, column in rest.items():
+            dims = ("time", *(f"{name}_{k}" for k in range(1, column.ndim)))
+            data[name] = (dims, column, {"units": self.units.get(name, "")})
         found: xarray.Dataset = xr.Dataset(data, coords={"time": ("time", self["time"], {"units": "s"})})
         return found
 
@@ -147,18 +147,18 @@ class Result:
     ) -> Result:
         from pliant.simulation import Energies
 
-        told = summary.get("error")
+        failure = summary.get("error")
         return cls(
             status=summary["status"],
             time=time,
             steps=summary["steps"],
             wall_seconds=summary["wall_seconds"],
             energies=Energies(*energies),
-            reactions={name: np.array(own) for name, own in summary["reactions"].items()},
+            reactions={name: np.array(force) for name, force in summary["reactions"].items()},
             warnings=summary["warnings"],
             files=summary["files"],
             history=_read_tables(summary["files"], units),
-            error=None if told is None else _failure(told),
+            error=None if failure is None else _failure(failure),
             summary=summary,
             folder=folder,
         )
@@ -211,15 +211,15 @@ class Result:
         return _table("Result", rows)
 
 
-def _failure(told: Mapping[str, Any]) -> SimulationError:
+def _failure(failure: Mapping[str, Any]) -> SimulationError:
     kinds: dict[str, type[SimulationError]]
     kinds = {"not-finite": UnstableError, "inverted": UnstableError, "unbalanced": UnstableError, "unstable": UnstableError}
     kinds |= {"not-converged": ConvergenceError, "singular": ConvergenceError, "blocked": BlockedError}
-    step, blocked = told.get("load_step") or {}, told.get("blocked") or {}
-    kind = kinds.get(told["kind"], SimulationError)
-    fields = {name: told.get(name) for name in ("kind", "body", "element", "node", "time")}
+    step, blocked = failure.get("load_step") or {}, failure.get("blocked") or {}
+    kind = kinds.get(failure["kind"], SimulationError)
+    fields = {name: failure.get(name) for name in ("kind", "body", "element", "node", "time")}
     fields |= {"load_step": step.get("number"), "residual": step.get("residual")}
-    return kind(told["message"], **fields, driver=blocked.get("driver"), force=blocked.get("force"))
+    return kind(failure["message"], **fields, driver=blocked.get("driver"), force=blocked.get("force"))
 
 
 def _read_tables(files: Sequence[str], units: Mapping[str, str]) -> History:

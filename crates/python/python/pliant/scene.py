@@ -115,10 +115,10 @@ class Scene:
         return scene
 
     def _tables(self, kind: str) -> MutableMapping[str, Any]:
-        own = self._data.setdefault(kind, {})
-        if not isinstance(own, MutableMapping):
+        tables = self._data.setdefault(kind, {})
+        if not isinstance(tables, MutableMapping):
             raise TypeError(f"`{kind}` of the scene is not a table")
-        return own
+        return tables
 
     @property
     def law(self) -> MutableMapping[str, Any]:
@@ -196,14 +196,14 @@ class Scene:
         return float(self._data["scene"]["until"])
 
     def __getitem__(self, key: str) -> Any:
-        own: Any = self._data
+        found: Any = self._data
         for part in _path(key):
             try:
-                own = _opened(own)
-                own = own[int(part)] if isinstance(own, (list, tuple, np.ndarray)) else own[part]
+                found = _opened(found)
+                found = found[int(part)] if isinstance(found, (list, tuple, np.ndarray)) else found[part]
             except (KeyError, IndexError, ValueError, TypeError):
                 raise KeyError(f"the scene has no `{key}`") from None
-        return own
+        return found
 
     def __setitem__(self, key: str, value: object) -> None:
         parts = _path(key)
@@ -211,15 +211,15 @@ class Scene:
         for tree in (self._data, self._pristine):
             if tree is self._pristine and self._origin is None:
                 continue
-            own: Any = tree
+            branch: Any = tree
             for part in parts[:-1]:
-                own = _inner(own, part, key)
+                branch = _inner(branch, part, key)
             try:
-                own[int(parts[-1]) if isinstance(own, list) else parts[-1]] = deepcopy(plain)
+                branch[int(parts[-1]) if isinstance(branch, list) else parts[-1]] = deepcopy(plain)
             except (IndexError, ValueError):
                 raise KeyError(f"the scene has no `{key}`") from None
         if self._origin is not None:
-            self._set = {known: own for known, own in self._set.items() if not known.startswith(f"{key}.")}
+            self._set = {known: setting for known, setting in self._set.items() if not known.startswith(f"{key}.")}
             self._set[key] = plain
 
     def replace(self, values: Mapping[str, object]) -> Scene:
@@ -237,7 +237,7 @@ class Scene:
     def copy(self) -> Scene:
         """A copy that shares meshes and images."""
         copy = Scene.__new__(Scene)
-        memo = {id(own): own for own in _given_in(self._data)}
+        memo = {id(given): given for given in _given_in(self._data)}
         copy._data = deepcopy(self._data, memo)
         copy._pristine = deepcopy(self._pristine, memo)
         copy._origin, copy._set, copy._given = self._origin, dict(self._set), dict(self._given)
@@ -254,8 +254,8 @@ class Scene:
             plain = {kind: _plain(table, given, kind) for kind, table in self._data.items()}
             name, sets = "scene.toml" if self._origin is None else self._origin[1], []
             text = _toml.document({k: v for k, v in plain.items() if v}, _NAMED)
-        meshes = {name: own._own for name, own in given.items() if isinstance(own, Mesh)}
-        images = {name: own._own for name, own in given.items() if isinstance(own, Image)}
+        meshes = {name: mesh._own for name, mesh in given.items() if isinstance(mesh, Mesh)}
+        images = {name: image._own for name, image in given.items() if isinstance(image, Image)}
         return text, name, self.folder, sets, meshes, images
 
     def to_toml(self) -> str:
@@ -277,9 +277,9 @@ class Scene:
         stem, folder = os.path.splitext(os.path.basename(path))[0], os.path.dirname(path)
 
         def written(name: str) -> str:
-            own = given[name]
-            file = f"{stem}-{name}.{'vtu' if isinstance(own, Mesh) else 'nii'}"
-            own.write(os.path.join(folder, file))
+            source = given[name]
+            file = f"{stem}-{name}.{'vtu' if isinstance(source, Mesh) else 'nii'}"
+            source.write(os.path.join(folder, file))
             return file
 
         for body in plain.get("body", {}).values():
@@ -290,7 +290,7 @@ class Scene:
                 if table.get(key) in given:
                     table[key] = written(table[key])
             if "masks" in table:
-                table["masks"] = [written(own) if own in given else own for own in table["masks"]]
+                table["masks"] = [written(mask) if mask in given else mask for mask in table["masks"]]
         with open(path, "w", encoding="utf-8") as file:
             file.write(_toml.document({kind: table for kind, table in plain.items() if table}, _NAMED))
 
@@ -368,11 +368,11 @@ def _opened(value: Any) -> Any:
     return value.to_dict() if isinstance(value, Table) else value
 
 
-def _inner(own: Any, part: str, key: str) -> Any:
+def _inner(parent: Any, part: str, key: str) -> Any:
     """The table or list at a part of a path, which can be written into: classes of tables, which are constant, become plain tables."""
-    at: Any = int(part) if isinstance(own, list) and part.lstrip("-").isdigit() else part
+    at: Any = int(part) if isinstance(parent, list) and part.lstrip("-").isdigit() else part
     try:
-        inner = own[at] if isinstance(own, list) else own.get(at)
+        inner = parent[at] if isinstance(parent, list) else parent.get(at)
     except (IndexError, TypeError):
         raise KeyError(f"the scene has no `{key}`") from None
     if inner is None:
@@ -383,31 +383,31 @@ def _inner(own: Any, part: str, key: str) -> Any:
         inner = list(inner)
     elif not isinstance(inner, (list, MutableMapping)):
         raise KeyError(f"`{key}` lies inside a value that is not a table")
-    own[at] = inner
+    parent[at] = inner
     return inner
 
 
 def _plain(value: Any, given: dict[str, Mesh | Image], name: str) -> Any:
     """Plain data: tables as dictionaries, meshes and images as their names."""
     if isinstance(value, (Mesh, Image)):
-        own = name.removesuffix(".image").removesuffix(".mesh").split(".")[-1]
+        stem = name.removesuffix(".image").removesuffix(".mesh").split(".")[-1]
         taken = next((known for known, other in given.items() if other is value), None)
         if taken is None:
-            taken, count = own, 2
+            taken, count = stem, 2
             while taken in given:
-                taken, count = f"{own}-{count}", count + 1
+                taken, count = f"{stem}-{count}", count + 1
             given[taken] = value
         return {"given": taken, "scale": 1.0} if isinstance(value, Mesh) else taken
     if isinstance(value, Table):
         return _plain(value.to_dict(), given, name)
     if isinstance(value, Mapping):
-        return {str(key): _plain(own, given, f"{name}.{key}") for key, own in value.items() if own is not None}
+        return {str(key): _plain(entry, given, f"{name}.{key}") for key, entry in value.items() if entry is not None}
     if isinstance(value, np.ndarray):
         return value.tolist()
     if isinstance(value, np.generic):
         return value.item()
     if isinstance(value, (list, tuple)):
-        return [_plain(own, given, name) for own in value]
+        return [_plain(element, given, name) for element in value]
     if value is None or isinstance(value, (bool, int, float, str)):
         return value
     raise TypeError(f"`{name}`: a scene holds numbers, texts, lists, tables, meshes and images, not {type(value).__name__}")
@@ -419,5 +419,5 @@ def _given_in(value: Any) -> Iterator[Mesh | Image]:
     elif isinstance(value, Table):
         yield from _given_in(value.to_dict())
     elif isinstance(value, (Mapping, list, tuple)):
-        for own in value.values() if isinstance(value, Mapping) else value:
-            yield from _given_in(own)
+        for element in value.values() if isinstance(value, Mapping) else value:
+            yield from _given_in(element)

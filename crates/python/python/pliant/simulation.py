@@ -407,7 +407,7 @@ class Simulation:
         every: float | None,
     ) -> None:
         if every is None:
-            tables = [own for own in self._model._scene._data.get("output", {}).values() if _kind(own) == "csv"]
+            tables = [output for output in self._model._scene._data.get("output", {}).values() if _kind(output) == "csv"]
             every = float(_every(tables[0])) if tables else (until - self.time) / 1000.0
         if until <= self.time:
             every = math.inf
@@ -455,9 +455,9 @@ class Simulation:
             return
         if body not in self._model.bodies:
             raise KeyError(f"there is no body `{body}`; there are {', '.join(self._model.bodies)}")
-        own, before = self._model.bodies[body].nodes, self._own.pushed()
+        nodes, before = self._model.bodies[body].nodes, self._own.pushed()
         every = before if len(before) else np.zeros((count, 3))
-        every[own] = numbers(forces, f"forces on `{body}`", (own.stop - own.start, 3))
+        every[nodes] = numbers(forces, f"forces on `{body}`", (nodes.stop - nodes.start, 3))
         self._own.push(every)
 
     def grip(
@@ -489,10 +489,10 @@ class Simulation:
         if not stiffness > 0.0:
             raise ValueError(f"`stiffness` of a grip must be greater than 0, not {stiffness} N/m")
         if nodes is not None:
-            own = indices(nodes, "nodes of a grip", (None,), len(self._model.rest))
-            if not len(own):
+            chosen = indices(nodes, "nodes of a grip", (None,), len(self._model.rest))
+            if not len(chosen):
                 raise ValueError("a grip needs nodes")
-            weights = [(int(node), 1.0 / len(own)) for node in own]
+            weights = [(int(node), 1.0 / len(chosen)) for node in chosen]
         else:
             place = numbers(at if at is not None else (), "the place of a grip", (3,))
             weights = self._own.around([float(x) for x in place], on, radius)
@@ -507,7 +507,7 @@ class Simulation:
         return grip
 
     def _hold(self) -> None:
-        all_grips = [(own._nodes, [float(x) for x in own._place], own._asked) for own in self._grips]
+        all_grips = [(grip._nodes, [float(x) for x in grip._place], grip._asked) for grip in self._grips]
         for grip, stiffness in zip(self._grips, self._own.hold(all_grips), strict=True):
             grip._stiffness = stiffness
 
@@ -629,5 +629,5 @@ def _quaternion(turn: NDArray[np.float64]) -> NDArray[np.float64]:
             [a[2, 1] - a[1, 2], a[0, 2] - a[2, 0], a[1, 0] - a[0, 1], a[0, 0] + a[1, 1] + a[2, 2]],
         ]
     )
-    own: NDArray[np.float64] = np.linalg.eigh(k)[1][:, 3]
-    return own
+    quaternion: NDArray[np.float64] = np.linalg.eigh(k)[1][:, 3]
+    return quaternion

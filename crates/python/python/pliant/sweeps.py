@@ -70,18 +70,18 @@ class Sweep:
         # Vectors and tables are no coordinates: their text is.
         texts = [{key: _toml.value(row[key]) if isinstance(row[key], (list, dict)) else row[key] for key in self.keys} for row in self.rows]
         axes = {key: list(dict.fromkeys(row[key] for row in texts)) for key in self.keys}
-        shape = tuple(len(own) for own in axes.values())
+        shape = tuple(len(values) for values in axes.values())
         if math.prod(shape) != len(self.rows):
             raise ValueError("these runs do not form a grid of values; use `to_pandas` for a table")
         names = [name for name in _columns(self.rows, self.keys) if name not in ("run", *self.keys, *_TOLD)]
         data = {}
         for name in names:
             there = [np.asarray(row[name]) for row in self.rows if name in row]
-            if len({own.shape for own in there}) != 1:
+            if len({array.shape for array in there}) != 1:
                 raise ValueError(f"the shape of `{name}` differs between runs; use `to_pandas` for a table")
-            own = np.array([row.get(name, np.full(there[0].shape, math.nan)) for row in self.rows])
-            dims = [*axes, *(f"{name}_{k}" for k in range(1, own.ndim))]
-            data[name] = (dims, own.reshape(shape + own.shape[1:]))
+            array = np.array([row.get(name, np.full(there[0].shape, math.nan)) for row in self.rows])
+            dims = [*axes, *(f"{name}_{k}" for k in range(1, array.ndim))]
+            data[name] = (dims, array.reshape(shape + array.shape[1:]))
         found: xarray.Dataset = xr.Dataset(data, coords=axes)
         return found
 
@@ -118,12 +118,12 @@ class _Bundle:
 
     def hashed(self, number: int) -> str:
         """The key of a row: it belongs to these values of this scene, to the code of `measure` and to this version."""
-        own = hashlib.sha256(self.scene)
+        digest = hashlib.sha256(self.scene)
         for name in sorted(self.files):
-            own.update(name.encode() + hashlib.sha256(self.files[name]).digest())
+            digest.update(name.encode() + hashlib.sha256(self.files[name]).digest())
         values = {key: pickle.dumps(value).hex() if isinstance(value, (Mesh, Image)) else value for key, value in self.combinations[number].items()}
-        own.update(json.dumps([values, self.code, self.version], sort_keys=True).encode())
-        return own.hexdigest()
+        digest.update(json.dumps([values, self.code, self.version], sort_keys=True).encode())
+        return digest.hexdigest()
 
 
 def sweep(
@@ -259,8 +259,8 @@ def _combinations(values: Any) -> tuple[list[dict[str, Any]], list[str]]:
         values = values.to_dict(orient="records")
     if isinstance(values, Mapping):
         keys = list(values)
-        lists = [list(own) if not isinstance(own, str) else [own] for own in values.values()]
-        return [dict(zip(keys, map(_number, own), strict=True)) for own in itertools.product(*lists)], keys
+        lists = [list(choices) if not isinstance(choices, str) else [choices] for choices in values.values()]
+        return [dict(zip(keys, map(_number, combination), strict=True)) for combination in itertools.product(*lists)], keys
     rows = [{str(key): _number(value) for key, value in row.items()} for row in values]
     keys = list(dict.fromkeys(key for row in rows for key in row))
     if any(list(row) != keys for row in rows):
@@ -277,9 +277,9 @@ def _number(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return value.tolist()
     if isinstance(value, (list, tuple)):
-        return [_number(own) for own in value]
+        return [_number(element) for element in value]
     if isinstance(value, Mapping):
-        return {str(key): _number(own) for key, own in value.items()}
+        return {str(key): _number(entry) for key, entry in value.items()}
     return value
 
 
@@ -326,11 +326,11 @@ def _files(value: Any, folder: str) -> Iterator[str]:
         if value and len(value) < 4096 and "\n" not in value and os.path.isfile(os.path.join(folder, value)):
             yield value
     elif isinstance(value, Mapping):
-        for own in value.values():
-            yield from _files(own, folder)
+        for entry in value.values():
+            yield from _files(entry, folder)
     elif isinstance(value, (list, tuple)):
-        for own in value:
-            yield from _files(own, folder)
+        for element in value:
+            yield from _files(element, folder)
 
 
 def _bytes(path: str) -> bytes:
@@ -353,7 +353,7 @@ def _run(bundle: _Bundle, number: int, stop: Stop | None = None) -> dict[str, An
             return row | {"status": "failed", "error": f"{type(error).__name__}: {error}"}
         if bundle.measure is not None and result.status == "done":
             try:
-                found |= {str(name): _jsonable(own) for name, own in bundle.measure(result).items()}
+                found |= {str(name): _jsonable(measured) for name, measured in bundle.measure(result).items()}
             except Exception as error:
                 found |= {"status": "failed", "error": f"measure: {type(error).__name__}: {error}"}
         return row | found
@@ -374,12 +374,12 @@ def _ran(bundle: _Bundle, number: int, folder: str | None, stop: Stop | None) ->
         model: Model = scene.replace(bundle.combinations[number]).build()
         out = None if bundle.keep is None else os.path.join(bundle.keep, f"run-{number:04}")
         result = model._run(out, threads=bundle.threads, force=out is not None, stop=stop)
-        last: dict[str, Any] = {} if out is not None else {name: float(own[-1]) for name, own in result.history.items() if name != "time"}
+        last: dict[str, Any] = {} if out is not None else {name: float(column[-1]) for name, column in result.history.items() if name != "time"}
     row: dict[str, Any] = {"status": result.status, "error": "" if result.error is None else str(result.error)}
     row |= {"time": result.time, "steps": result.steps, "step": model.step, "wall_seconds": result.wall_seconds}
-    row |= last or {f"energy.{name}": own for name, own in result.energies._asdict().items()}
+    row |= last or {f"energy.{name}": energy for name, energy in result.energies._asdict().items()}
     for name, force in result.reactions.items():
-        row |= {f"reaction.{name}.{axis}": float(own) for axis, own in zip("xyz", force, strict=True)}
+        row |= {f"reaction.{name}.{axis}": float(component) for axis, component in zip("xyz", force, strict=True)}
     return result, row
 
 
@@ -431,7 +431,7 @@ def _known(path: str, bundle: _Bundle) -> dict[int, dict[str, Any]]:
 
 
 def _public(row: dict[str, Any]) -> dict[str, Any]:
-    return {name: own for name, own in row.items() if name not in ("key", "keys", "runs", "row", "version")}
+    return {name: value for name, value in row.items() if name not in ("key", "keys", "runs", "row", "version")}
 
 
 def _columns(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> list[str]:

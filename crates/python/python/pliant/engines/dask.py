@@ -25,12 +25,12 @@ class Dask:
 
     def run(self, task: Task, bundle: Any, numbers: Iterable[int]) -> Generator[dict[str, Any]]:
         """Rows as runs end."""
-        client, own = self._client, None
+        client, local_client = self._client, None
         if client is None:
             try:
                 client = self._distributed.get_client()
             except ValueError:
-                own = client = self._distributed.Client(processes=True, threads_per_worker=1, dashboard_address=None)
+                local_client = client = self._distributed.Client(processes=True, threads_per_worker=1, dashboard_address=None)
         lacking = [name for name, found in client.run(importlib.util.find_spec, "pliant").items() if found is None]
         if lacking:
             raise ClusterError(f"pliant is not installed on {', '.join(lacking)}; install the version of this process there", hosts=lacking)
@@ -55,8 +55,8 @@ class Dask:
         finally:
             self.ended = [future.result() for future in pending if future.status == "finished"]
             client.cancel([future for future in pending if not future.done()])
-            if own is not None:
-                own.close()
+            if local_client is not None:
+                local_client.close()
 
 
 def _same(bundle: Any) -> Any:

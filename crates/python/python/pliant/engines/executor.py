@@ -24,13 +24,13 @@ class Futures:
 
     def run(self, task: Task, bundle: Any, numbers: Iterable[int]) -> Generator[dict[str, Any]]:
         """Rows as runs end."""
-        own = ThreadPoolExecutor(self._threads, thread_name_prefix="pliant") if self._executor is None else None
-        executor = own or self._executor
+        pool = ThreadPoolExecutor(self._threads, thread_name_prefix="pliant") if self._executor is None else None
+        executor = pool or self._executor
         assert executor is not None
         stop = Stop()
         # Another process can't be stopped by a flag of this one.
-        extra = () if own is None else (stop,)
-        most = 2 * self._threads if own else _MOST
+        extra = () if pool is None else (stop,)
+        most = 2 * self._threads if pool else _MOST
         left = iter(numbers)
         pending: set[Future[dict[str, Any]]] = set()
         try:
@@ -49,7 +49,7 @@ class Futures:
             stop.ask()
             for future in pending:
                 future.cancel()
-            if own is not None:
-                own.shutdown(wait=True, cancel_futures=True)
+            if pool is not None:
+                pool.shutdown(wait=True, cancel_futures=True)
             ended = (future for future in pending if future.done() and not future.cancelled())
             self.ended = [future.result() for future in ended if future.exception() is None]

@@ -23,8 +23,8 @@ class Ray:
     def run(self, task: Task, bundle: Any, numbers: Iterable[int]) -> Generator[dict[str, Any]]:
         """Rows as runs end."""
         ray = self._ray
-        own = not ray.is_initialized()
-        if own:
+        started = not ray.is_initialized()
+        if started:
             ray.init(include_dashboard=False, log_to_driver=False)
         shared, remote = ray.put(bundle), ray.remote(task).options(**self._options)
         cores = int(ray.cluster_resources().get("CPU", 1))
@@ -48,5 +48,5 @@ class Ray:
                     self.ended.append(ray.get(reference))
             for reference in running:
                 ray.cancel(reference, force=True)
-            if own:
+            if started:
                 ray.shutdown()
