@@ -52,7 +52,7 @@ impl<R: LaneNumber> AppliedForces<R> {
         for (index, body) in model.bodies.iter().enumerate() {
             body_of[body.nodes.start as usize..body.nodes.end as usize].fill(index as u16);
         }
-        let mut own = Self {
+        let mut applied = Self {
             nodal: vec![[0.0; 3]; model.node_count()],
             gravity: vec![[0.0; 3]; model.bodies.len()],
             weight: vec![[R::ZERO; 3]; if weighs { model.node_count() } else { 0 }],
@@ -65,8 +65,8 @@ impl<R: LaneNumber> AppliedForces<R> {
             grips: Vec::new(),
             given: Vec::new(),
         };
-        own.see_whether_loaded();
-        own
+        applied.see_whether_loaded();
+        applied
     }
 
     /// Replaces the grips.
@@ -133,8 +133,8 @@ impl<R: LaneNumber> AppliedForces<R> {
         for grip in &self.grips {
             grip.add_forces(&state, &mut self.nodal);
         }
-        for (own, given) in self.nodal.iter_mut().zip(&self.given) {
-            *own = add(*own, *given);
+        for (force, given) in self.nodal.iter_mut().zip(&self.given) {
+            *force = add(*force, *given);
         }
         model.give_back(&mut self.nodal);
     }

@@ -52,7 +52,7 @@ pub(crate) struct Collective {
     /// The volume and its pressure at the last evaluation; zero of other constraints.
     pub enclosed: Enclosed,
     /// Force [N] on each node.
-    own: Vec<Vector<f64>>,
+    nodal_forces: Vec<Vector<f64>>,
     predicted: Vec<Predicted>,
     /// Volume [m³] at rest, the gradient [m²] now and that after the step.
     rest_volume: f64,
@@ -61,21 +61,22 @@ pub(crate) struct Collective {
 
 impl Collective {
     /// Builds the collective constraints of a model.
-    pub fn all(model: &Model) -> Vec<Self> {
-        let collective = model.constraints.iter().enumerate().filter(|(_, own)| own.motion.is_collective());
-        let new = |(constraint, own): (usize, &Constraint)| {
-            let mut gradient = vec![[0.0; 3]; own.nodes.len()];
-            let rest = |at: u32| model.rest[own.nodes[at as usize] as usize];
-            let rest_volume = match &own.motion {
+    pub fn of_model(model: &Model) -> Vec<Self> {
+        let collective =
+            model.constraints.iter().enumerate().filter(|(_, constraint)| constraint.motion.is_collective());
+        let new = |(index, constraint): (usize, &Constraint)| {
+            let mut gradient = vec![[0.0; 3]; constraint.nodes.len()];
+            let rest = |at: u32| model.rest[constraint.nodes[at as usize] as usize];
+            let rest_volume = match &constraint.motion {
                 Motion::Volume { enclosure, .. } => enclosure.add_gradient(rest, &mut gradient),
                 _ => 0.0,
             };
             Self {
-                constraint,
+                constraint: index,
                 force: [0.0; 3],
                 enclosed: Enclosed { volume: rest_volume, pressure: 0.0 },
-                own: vec![[0.0; 3]; own.nodes.len()],
-                predicted: Vec::with_capacity(own.nodes.len()),
+                nodal_forces: vec![[0.0; 3]; constraint.nodes.len()],
+                predicted: Vec::with_capacity(constraint.nodes.len()),
                 rest_volume,
                 gradients: [gradient.clone(), gradient],
             }
@@ -96,7 +97,7 @@ impl Collective {
                     let apart = by[c] * factor - free().map(|(p, w)| w * p.displacement[c]).sum::<f64>();
                     let mobility: f64 = free().map(|(p, w)| w * w * p.mobility).sum();
                     let force = if constraint.components[c] { apart / mobility } else { 0.0 };
-                    self.own.iter_mut().zip(weights).for_each(|(own, w)| own[c] = w * force);
+                    self.nodal_forces.iter_mut().zip(weights).for_each(|(on_node, w)| on_node[c] = w * force);
                 }
             }
             Motion::Volume { enclosure, by, .. } => {
@@ -104,7 +105,7 @@ impl Collective {
             }
             _ => self.find_rigid(model),
         }
-        self.force = self.own.iter().fold([0.0; 3], |sum, &force| add(sum, force));
+        self.force = self.nodal_forces.iter().fold([0.0; 3], |sum, &force| add(sum, force));
     }
 
     /// Finds the forces of the pressure that fills an enclosure to a volume [m³].
@@ -124,8 +125,8 @@ impl Collective {
         for _ in 0..MOST_PRESSURES {
             then.fill([0.0; 3]);
             let place = |at: u32| {
-                let own = predicted[at as usize].displacement;
-                let moved = [0, 1, 2].map(|c| own[c] + pressure * way(at as usize, c));
+                let displacement = predicted[at as usize].displacement;
+                let moved = [0, 1, 2].map(|c| displacement[c] + pressure * way(at as usize, c));
                 add(rest(at), moved)
             };
             let found = enclosure.add_gradient(place, then);
@@ -140,7 +141,7 @@ impl Collective {
                 break;
             }
         }
-        self.own.iter_mut().zip(&*now).for_each(|(own, g)| *own = scale(*g, pressure));
+        self.nodal_forces.iter_mut().zip(&*now).for_each(|(force, g)| *force = scale(*g, pressure));
         self.enclosed.pressure += pressure;
     }
 
@@ -174,10 +175,10 @@ impl Collective {
                 let (mut force, mut moment, mut inertia) =
                     (Vector3::zeros(), Vector3::zeros(), Matrix3::zeros());
                 for (node, at) in nodes() {
-                    let (arm, own) =
+                    let (arm, nodal) =
                         (Vector3::from(sub(place(at), centre)), Vector3::from(cast(forces[node])));
-                    force += own * part;
-                    moment += arm.cross(&own);
+                    force += nodal * part;
+                    moment += arm.cross(&nodal);
                     inertia += Matrix3::from_diagonal_element(arm.norm_squared()) - arm * arm.transpose();
                 }
                 // Nodes on a line have no inertia about it, and no moment.
@@ -232,20 +233,20 @@ impl Collective {
         }
         for index in 0..count {
             let target = add(then, (turn * arm(rest(index), first)).into());
-            self.own[index] = scale(sub(target, place(index)), mass(index));
+            self.nodal_forces[index] = scale(sub(target, place(index)), mass(index));
         }
     }
 
     /// The force [N] on each node.
     pub fn forces(&self, model: &Model) -> impl Iterator<Item = (u32, Vector<f64>)> {
-        model.constraints[self.constraint].nodes.iter().copied().zip(self.own.iter().copied())
+        model.constraints[self.constraint].nodes.iter().copied().zip(self.nodal_forces.iter().copied())
     }
 }
 
 /// Volume and pressure of a constraint of volume; `None` of others.
-pub(crate) fn enclosed(model: &Model, all: &[Collective], constraint: usize) -> Option<Enclosed> {
-    let own = all.iter().find(|own| own.constraint == constraint)?;
-    model.constraints[constraint].motion.encloses().then_some(own.enclosed)
+pub(crate) fn enclosed(model: &Model, collectives: &[Collective], constraint: usize) -> Option<Enclosed> {
+    let collective = collectives.iter().find(|collective| collective.constraint == constraint)?;
+    model.constraints[constraint].motion.encloses().then_some(collective.enclosed)
 }
 
 #[cfg(test)]

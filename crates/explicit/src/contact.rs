@@ -60,7 +60,7 @@ struct Node {
     /// Mobility [m/N] under contacts; zero for prescribed components and for nodes that jaws hold.
     mobility: Vector3<f64>,
     /// Mobility [m/N] under any force.
-    own: Vector3<f64>,
+    free_mobility: Vector3<f64>,
     /// Impulses [N] of rows on it, of a node that jaws hold.
     borne: Vector3<f64>,
     /// Impulses [N] of the last pass on it.
@@ -84,7 +84,7 @@ impl Node {
             free: zero,
             then: zero,
             mobility: zero,
-            own: zero,
+            free_mobility: zero,
             borne: zero,
             lifted: zero,
             way: 0.0,
@@ -128,7 +128,7 @@ pub(crate) struct ContactSolver<R> {
     nodes: Vec<Node>,
     /// The nodes that may touch something in the step, increasing.
     near: Vec<u32>,
-    own: Vec<Own>,
+    partners: Vec<Own>,
     /// Nodes at a rigid thing.
     seen: Vec<Seen>,
     rows: Vec<Row>,
@@ -170,7 +170,7 @@ impl<R: LaneNumber> ContactSolver<R> {
                     .map(|(pairs, sign)| Own::Bodies(Box::new(pairs), sign)),
             }
         });
-        let own = parts.flatten().collect();
+        let partners = parts.flatten().collect();
         let with_bodies = contacts.contacts.iter().filter(|contact| !matches!(contact.with, With::Rigid(_)));
         let of_bodies = with_bodies.flat_map(Contact::surfaces).flat_map(|surface| &surface.nodes);
         let of_bodies = of_bodies.map(|&node| number(node)).collect();
@@ -190,7 +190,7 @@ impl<R: LaneNumber> ContactSolver<R> {
             slid: Vec::new(),
             numbers,
             coupled_surfaces,
-            own,
+            partners,
             forces: vec![[0.0; 3]; contacts.contacts.len()],
             moments: vec![[0.0; 3]; contacts.contacts.len()],
             contacts,
@@ -214,15 +214,15 @@ impl<R: LaneNumber> ContactSolver<R> {
             let node = &mut self.nodes[node as usize];
             (node.near, node.paired) = (false, false);
         }
-        for own in &mut self.own {
-            if let Own::Rigid(own) = own {
-                let rigid = &self.contacts.rigids[own.rigid];
-                let posture = postures(own.rigid, rigid);
-                (own.passage, own.grips) =
+        for partner in &mut self.partners {
+            if let Own::Rigid(at_rigid) = partner {
+                let rigid = &self.contacts.rigids[at_rigid.rigid];
+                let posture = postures(at_rigid.rigid, rigid);
+                (at_rigid.passage, at_rigid.grips) =
                     (Passage::new(rigid, posture.stances), rigid.grips(posture.opening));
             }
         }
-        gripped.retain(|held| self.holder(held).is_some_and(|(_, own, _)| own.grips));
+        gripped.retain(|held| self.holder(held).is_some_and(|(_, at_rigid, _)| at_rigid.grips));
         let way = self.list(now);
         self.place(now, gripped);
         self.look(way, free, gripped);
@@ -269,9 +269,9 @@ impl<R: LaneNumber> ContactSolver<R> {
     pub fn nodal_forces(&self) -> impl Iterator<Item = (u32, Vector<f64>)> {
         let nodes = self.near.iter().map(|&node| (&self.nodes[node as usize], self.numbers[node as usize]));
         // Coupled nodes are the last ones.
-        let own = nodes.take_while(|(_, number)| self.coupled_surfaces.place_of(*number).is_none());
-        let touching = own.filter(|(node, _)| node.then != node.free);
-        touching.map(|(node, number)| (number, over(&(node.then - node.free), &node.own).into()))
+        let uncoupled = nodes.take_while(|(_, number)| self.coupled_surfaces.place_of(*number).is_none());
+        let touching = uncoupled.filter(|(node, _)| node.then != node.free);
+        touching.map(|(node, number)| (number, over(&(node.then - node.free), &node.free_mobility).into()))
     }
 
     /// Leads the coupled nodes from one place [m] to another between two times [s], at constant speed.
@@ -295,9 +295,9 @@ impl<R: LaneNumber> ContactSolver<R> {
 
     /// The nodes of the model between the first and the last that touch.
     fn span(&self) -> Range<usize> {
-        let own = &self.numbers
+        let uncoupled = &self.numbers
             [..self.numbers.partition_point(|&node| self.coupled_surfaces.place_of(node).is_none())];
-        match (own.first(), own.last()) {
+        match (uncoupled.first(), uncoupled.last()) {
             (Some(&first), Some(&last)) => first as usize..last as usize + 1,
             _ => 0..0,
         }
@@ -312,11 +312,11 @@ impl<R: LaneNumber> ContactSolver<R> {
             now.ways(span.clone(), if is_first { &now.displacement[span.clone()] } else { &self.listed });
         let rigids = &self.contacts.rigids;
         let rooms = self.contacts.contacts.iter().map(|contact| contact.touch.offset + 2.0 * way);
-        let holds = |(own, room): (&Own, f64)| match own {
-            Own::Rigid(own) => own.holds(&rigids[own.rigid], room, moved),
+        let holds = |(partner, room): (&Own, f64)| match partner {
+            Own::Rigid(at_rigid) => at_rigid.holds(&rigids[at_rigid.rigid], room, moved),
             Own::Bodies(..) => true,
         };
-        if !is_first && self.own.iter().zip(rooms.clone()).all(holds) {
+        if !is_first && self.partners.iter().zip(rooms.clone()).all(holds) {
             return way;
         }
         self.listed.clear();
@@ -329,10 +329,10 @@ impl<R: LaneNumber> ContactSolver<R> {
             &mut self.places,
         );
         self.placed.clone_from(&self.of_bodies);
-        for (own, room) in self.own.iter_mut().zip(rooms) {
-            if let Own::Rigid(own) = own {
-                own.list(&rigids[own.rigid], room, &self.places);
-                self.placed.extend_from_slice(own.listed());
+        for (partner, room) in self.partners.iter_mut().zip(rooms) {
+            if let Own::Rigid(at_rigid) = partner {
+                at_rigid.list(&rigids[at_rigid.rigid], room, &self.places);
+                self.placed.extend_from_slice(at_rigid.listed());
             }
         }
         self.placed.sort_unstable();
@@ -350,22 +350,23 @@ impl<R: LaneNumber> ContactSolver<R> {
 
     /// Finds the nodes that may touch in the step, and where they go; rows of the points near rigid things.
     fn look(&mut self, way: f64, free: impl Fn(u32) -> Free, gripped: &[Gripped]) {
-        let Self { contacts, numbers, coupled_surfaces, places, nodes, near, own, seen, rows, .. } = self;
+        let Self { contacts, numbers, coupled_surfaces, places, nodes, near, partners, seen, rows, .. } =
+            self;
         rows.clear();
         let mut mark = |node: u32| {
             if !std::mem::replace(&mut nodes[node as usize].near, true) {
                 near.push(node);
             }
         };
-        for (index, own) in own.iter_mut().enumerate() {
-            match own {
-                Own::Rigid(own) => {
+        for (index, partner) in partners.iter_mut().enumerate() {
+            match partner {
+                Own::Rigid(at_rigid) => {
                     let offset = contacts.contacts[index].touch.offset;
-                    let (rigid, room) = (&contacts.rigids[own.rigid], offset + 2.0 * way);
-                    own.look(rigid, room, places, seen, |row| {
+                    let (rigid, room) = (&contacts.rigids[at_rigid.rigid], offset + 2.0 * way);
+                    at_rigid.look(rigid, room, places, seen, |row| {
                         rows.push(Row { contact: index, ..row });
                     });
-                    own.near.iter().for_each(|&node| mark(node));
+                    at_rigid.near.iter().for_each(|&node| mark(node));
                 }
                 Own::Bodies(pairs, _) => {
                     pairs.update(|node| places[node as usize]);
@@ -381,7 +382,7 @@ impl<R: LaneNumber> ContactSolver<R> {
             let (node, number) = (&mut nodes[node as usize], numbers[node as usize]);
             let Free { then, mobility } = coupled_surfaces.free(number).unwrap_or_else(|| free(number));
             (node.free, node.then) = (then.into(), then.into());
-            (node.mobility, node.own) = (mobility.into(), mobility.into());
+            (node.mobility, node.free_mobility) = (mobility.into(), mobility.into());
             (node.borne, node.lifted, node.way) = (Vector3::zeros(), Vector3::zeros(), 0.0);
         }
     }
@@ -389,21 +390,21 @@ impl<R: LaneNumber> ContactSolver<R> {
     /// The contact by which a jaw holds a node, by its place, and the node's own number.
     fn holder(&self, held: &Gripped) -> Option<(usize, &AtRigid, usize)> {
         let node = self.numbers.binary_search(&held.node).ok()?;
-        self.own.iter().enumerate().find_map(|(index, own)| {
-            let Own::Rigid(own) = own else { return None };
-            let holds =
-                own.rigid == held.rigid as usize && own.surface.nodes.binary_search(&(node as u32)).is_ok();
-            holds.then_some((index, &**own, node))
+        self.partners.iter().enumerate().find_map(|(index, partner)| {
+            let Own::Rigid(at_rigid) = partner else { return None };
+            let holds = at_rigid.rigid == held.rigid as usize
+                && at_rigid.surface.nodes.binary_search(&(node as u32)).is_ok();
+            holds.then_some((index, &**at_rigid, node))
         })
     }
 
     /// Takes along the nodes that jaws hold.
     fn grip(&mut self, gripped: &[Gripped]) {
         for held in gripped {
-            let Some((_, own, node)) = self.holder(held) else { continue };
-            let goal = own.passage.place(&held.at.into());
+            let Some((_, at_rigid, node)) = self.holder(held) else { continue };
+            let goal = at_rigid.passage.place(&held.at.into());
             let node = &mut self.nodes[node];
-            for c in (0..3).filter(|&c| node.own[c] > 0.0) {
+            for c in (0..3).filter(|&c| node.free_mobility[c] > 0.0) {
                 (node.then[c], node.mobility[c]) = (goal[c], 0.0);
             }
         }
@@ -414,7 +415,7 @@ impl<R: LaneNumber> ContactSolver<R> {
         for held in gripped {
             let Some((index, _, at)) = self.holder(held) else { continue };
             let node = &self.nodes[at];
-            let force = over(&(node.then - node.free), &node.own) - node.borne;
+            let force = over(&(node.then - node.free), &node.free_mobility) - node.borne;
             self.forces[index] = add(self.forces[index], force.into());
             self.moments[index] = add(self.moments[index], self.places[at].cross(&force).into());
         }
@@ -422,21 +423,22 @@ impl<R: LaneNumber> ContactSolver<R> {
 
     /// Lets jaws that are closed hold, from the next step on, the nodes that touch their inner faces.
     fn take(&mut self, gripped: &[Gripped]) {
-        let Self { contacts, own, nodes, numbers, taken, .. } = self;
-        for (contact, own) in contacts.contacts.iter().zip(&*own) {
-            let Own::Rigid(own) = own else { continue };
-            if !own.grips {
+        let Self { contacts, partners, nodes, numbers, taken, .. } = self;
+        for (contact, partner) in contacts.contacts.iter().zip(&*partners) {
+            let Own::Rigid(at_rigid) = partner else { continue };
+            if !at_rigid.grips {
                 continue;
             }
-            let rigid = &contacts.rigids[own.rigid];
+            let rigid = &contacts.rigids[at_rigid.rigid];
             let inward = rigid.jaw.as_ref().map_or(0.0, |jaw| jaw.part.signum());
-            for &node in own.surface.nodes.iter().filter(|&&node| nodes[node as usize].near) {
-                let (at, Near { distance, normal }) = own.passage.within(rigid, &nodes[node as usize].then);
+            for &node in at_rigid.surface.nodes.iter().filter(|&&node| nodes[node as usize].near) {
+                let (at, Near { distance, normal }) =
+                    at_rigid.passage.within(rigid, &nodes[node as usize].then);
                 let node = numbers[node as usize];
                 let touches = distance - contact.touch.offset <= TOUCHING * rigid.shape.thinnest();
                 let known = || gripped.iter().chain(&*taken).any(|held| held.node == node);
                 if touches && normal.y * inward > INWARD && !known() {
-                    taken.push(Gripped { rigid: own.rigid as u32, node, at: at.into() });
+                    taken.push(Gripped { rigid: at_rigid.rigid as u32, node, at: at.into() });
                 }
             }
         }
@@ -444,20 +446,20 @@ impl<R: LaneNumber> ContactSolver<R> {
 
     /// Finds the gaps of all rows; leaves out those that are too wide to close.
     fn measure(&mut self) {
-        let Self { contacts, places, nodes, own, rows, .. } = self;
+        let Self { contacts, places, nodes, partners, rows, .. } = self;
         let mut deepest = 0.0_f64;
         rows.retain_mut(|row| {
-            let Own::Rigid(own) = &own[row.contact] else { return false };
+            let Own::Rigid(at_rigid) = &partners[row.contact] else { return false };
             let now = row.place(places, nodes);
-            let rigid = &contacts.rigids[own.rigid];
+            let rigid = &contacts.rigids[at_rigid.rigid];
             let offset = contacts.contacts[row.contact].touch.offset;
-            let Near { distance, normal } = own.passage.meet(rigid, offset, &now, &row.place);
-            (row.normal, row.gap, row.carried) = (normal, distance - offset, own.passage.carry(&now));
+            let Near { distance, normal } = at_rigid.passage.meet(rigid, offset, &now, &row.place);
+            (row.normal, row.gap, row.carried) = (normal, distance - offset, at_rigid.passage.carry(&now));
             deepest = deepest.max(-row.gap);
-            row.gap < own.margin
+            row.gap < at_rigid.margin
         });
-        for (index, own) in own.iter().enumerate() {
-            let Own::Bodies(pairs, sign) = own else { continue };
+        for (index, partner) in partners.iter().enumerate() {
+            let Own::Bodies(pairs, sign) = partner else { continue };
             let first = rows.len();
             // Impulses along the way between two points before the step have no moment.
             pairs.find(
@@ -493,11 +495,11 @@ impl<R: LaneNumber> ContactSolver<R> {
                 break;
             }
         }
-        let Self { nodes, rows, forces, moments, places, own, .. } = self;
+        let Self { nodes, rows, forces, moments, places, partners, .. } = self;
         for row in rows.iter() {
             let force = (row.normal * row.push + row.drag) * row.sign;
             forces[row.contact] = add(forces[row.contact], force.into());
-            if matches!(own[row.contact], Own::Rigid(_)) {
+            if matches!(partners[row.contact], Own::Rigid(_)) {
                 let place: Vector3<f64> = row.parts().map(|(node, weight)| places[node] * weight).sum();
                 moments[row.contact] = add(moments[row.contact], place.cross(&force).into());
             }
@@ -538,12 +540,12 @@ impl<R: LaneNumber> ContactSolver<R> {
     /// Sides of things beside nodes that impulses have moved, and their impulses, a node at a time. How far
     /// that moves a node at most [m].
     fn settle(&mut self, deepest: f64) -> f64 {
-        let Self { contacts, places, nodes, own, rows, .. } = self;
+        let Self { contacts, places, nodes, partners, rows, .. } = self;
         let mut farthest = 0.0_f64;
-        for (index, own) in own.iter().enumerate() {
-            let Own::Rigid(own) = own else { continue };
-            let (rigid, touch) = (&contacts.rigids[own.rigid], &contacts.contacts[index].touch);
-            for &number in &own.near {
+        for (index, partner) in partners.iter().enumerate() {
+            let Own::Rigid(at_rigid) = partner else { continue };
+            let (rigid, touch) = (&contacts.rigids[at_rigid.rigid], &contacts.contacts[index].touch);
+            for &number in &at_rigid.near {
                 let at = number as usize;
                 if nodes[at].then == nodes[at].free {
                     continue;
@@ -552,9 +554,9 @@ impl<R: LaneNumber> ContactSolver<R> {
                 let before = nodes[at].then;
                 for _ in 0..LOOKED {
                     let place = nodes[at].then;
-                    let (gap, normal) = own.gap(rigid, touch.offset, &places[at], &place);
+                    let (gap, normal) = at_rigid.gap(rigid, touch.offset, &places[at], &place);
                     let side = if gap < -OFF * depth {
-                        let carried = own.passage.carry(&places[at]);
+                        let carried = at_rigid.passage.carry(&places[at]);
                         idle(rows, &mut nodes[at], Row { carried, ..Row::new(index, [number], [1.0]) })
                     } else if gap > OFF * depth {
                         take_back(rows, &mut nodes[at], index)
@@ -576,10 +578,12 @@ impl<R: LaneNumber> ContactSolver<R> {
     /// Lifts nodes that are still in a thing.
     fn lift(&mut self) {
         let sums = self.forces.iter_mut().zip(&mut self.moments);
-        for ((contact, own), (force, moment)) in self.contacts.contacts.iter().zip(&self.own).zip(sums) {
-            let Own::Rigid(own) = own else { continue };
-            let rigid = &self.contacts.rigids[own.rigid];
-            for &node in &own.near {
+        for ((contact, partner), (force, moment)) in
+            self.contacts.contacts.iter().zip(&self.partners).zip(sums)
+        {
+            let Own::Rigid(at_rigid) = partner else { continue };
+            let rigid = &self.contacts.rigids[at_rigid.rigid];
+            for &node in &at_rigid.near {
                 let now = &self.places[node as usize];
                 let node = &mut self.nodes[node as usize];
                 // Where it goes freely it is out of the thing, or it would have a row.
@@ -588,7 +592,7 @@ impl<R: LaneNumber> ContactSolver<R> {
                 }
                 let mut first = None;
                 for _ in 0..LIFTS {
-                    let (gap, normal) = own.gap(rigid, contact.touch.offset, now, &node.then);
+                    let (gap, normal) = at_rigid.gap(rigid, contact.touch.offset, now, &node.then);
                     let deepest = *first.get_or_insert(gap.min(0.0));
                     let along = node.mobility.component_mul(&normal);
                     if gap >= LIFTED * deepest || along.dot(&normal) <= 0.0 {

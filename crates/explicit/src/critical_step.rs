@@ -192,8 +192,8 @@ fn limit_if_enough<R: LaneNumber>(
 ) -> Option<f64> {
     let farthest = displacement.as_flattened().iter().fold(0.0, |most: f64, u| most.max(u.to_f64().abs()));
     let [smallest, critical] = cell_sizes(model);
-    let all = [FORWARD_IN_SINGLE, CENTRAL_IN_SINGLE];
-    let suiting = if is_smooth(model) { &all[..] } else { &all[1..] };
+    let candidates = [FORWARD_IN_SINGLE, CENTRAL_IN_SINGLE];
+    let suiting = if is_smooth(model) { &candidates[..] } else { &candidates[1..] };
     let mut differences = suiting.iter().map(|&difference| sized(difference, smallest));
     // Displacements are rounded, and so are the strains of the critical cell.
     let rounded = R::EPSILON * (farthest + critical);
@@ -250,10 +250,10 @@ fn cell_sizes(model: &Model) -> [f64; 2] {
         [square.sqrt().recip(), cell_bound(solid, cell)]
     };
     let (mut smallest, mut critical) = (f64::INFINITY, [0.0, f64::INFINITY]);
-    for own in model.solids.iter().filter(|solid| !solid.cells.is_empty()).map(smallest_of) {
-        smallest = own[0].min(smallest);
-        if own[1] < critical[1] {
-            critical = own;
+    for sizes in model.solids.iter().filter(|solid| !solid.cells.is_empty()).map(smallest_of) {
+        smallest = sizes[0].min(smallest);
+        if sizes[1] < critical[1] {
+            critical = sizes;
         }
     }
     [smallest, critical[0]]
@@ -334,8 +334,8 @@ impl<'a, R: LaneNumber> Operator<'a, R> {
                 let mut product = 0.0;
                 for (node, (out, (v, w))) in out.iter_mut().zip(v.iter().zip(w)).enumerate() {
                     let change = before.get(first + node).map_or(found[node], |&f| sub(found[node], f));
-                    let own = [0, 1, 2].map(|c| scale * change[c] * w[c]);
-                    *out = if index == 0 { own } else { add(*out, own) };
+                    let term = [0, 1, 2].map(|c| scale * change[c] * w[c]);
+                    *out = if index == 0 { term } else { add(*out, term) };
                     product += wide_dot(*out, *v);
                 }
                 product
@@ -606,15 +606,15 @@ mod tests {
         let mut calls = [0; 2];
         of_deformed_cubes(|name, model, displacement| {
             let owners = model.constrained_components().unwrap();
-            let own = [f64::INFINITY, 0.0].map(|enough| {
+            let needed = [f64::INFINITY, 0.0].map(|enough| {
                 let mut forces = InternalForces::<f64>::new(model, 1.0);
                 let difference = sized(CENTRAL, cell_sizes(model)[0]);
                 let mut operator = Operator::new(model, &owners, &mut forces, displacement, difference);
                 largest_eigenvalue(&mut operator, Until::Enough(enough));
                 operator.calls
             });
-            assert!(own[1] <= own[0], "{name}: {own:?}");
-            (0..2).for_each(|k| calls[k] += own[k]);
+            assert!(needed[1] <= needed[0], "{name}: {needed:?}");
+            (0..2).for_each(|k| calls[k] += needed[k]);
         });
         assert!(10 * calls[1] < 9 * calls[0], "{calls:?}");
     }

@@ -35,8 +35,8 @@ impl<R: LaneNumber> History<R> {
         point: usize,
     ) -> impl Iterator<Item = Symmetric<f64>> + '_ {
         let slots = Self::slots(solid);
-        let own = slots / solid.cells.points();
-        let packs = cell / PACK * slots + point * own..cell / PACK * slots + (point + 1) * own;
+        let per_point = slots / solid.cells.points();
+        let packs = cell / PACK * slots + point * per_point..cell / PACK * slots + (point + 1) * per_point;
         let tensors = self.cells[6 * packs.start..6 * packs.end].chunks_exact(6);
         tensors.map(move |packs| Symmetric(std::array::from_fn(|k| packs[k].0[cell % PACK].to_f64())))
     }

@@ -199,10 +199,10 @@ impl<'a, R: LaneNumber> Known<&'a [Vector<R>]> {
     /// Fills up the block with nodes at rest beyond the last node, for which there is room.
     #[inline(always)]
     fn filled_up(self, room: &'a mut Known<[Vector<R>; BLOCK]>) -> Whole<'a, R> {
-        let fill = |own: &'a [Vector<R>], room: &'a mut [Vector<R>; BLOCK]| match own.first_chunk() {
+        let fill = |vectors: &'a [Vector<R>], room: &'a mut [Vector<R>; BLOCK]| match vectors.first_chunk() {
             Some(whole) => whole,
             None => {
-                room[..own.len()].copy_from_slice(own);
+                room[..vectors.len()].copy_from_slice(vectors);
                 &*room
             }
         };

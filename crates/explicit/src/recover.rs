@@ -153,10 +153,11 @@ impl<'a, R: LaneNumber> Recovery<'a, R> {
         let part = &self.model.solids[solid];
         match &part.cells {
             Cells::FullHex8(_, points) => {
-                let own = &points[cell];
-                let at = |point: usize| (cell, point, self.gradient(solid, cell, &own.gradient[point]));
-                let found = self.points(solid, &from_fn(|lane| at(lane % own.weight.len())));
-                let points = own.weight.iter().enumerate();
+                let quadrature = &points[cell];
+                let at =
+                    |point: usize| (cell, point, self.gradient(solid, cell, &quadrature.gradient[point]));
+                let found = self.points(solid, &from_fn(|lane| at(lane % quadrature.weight.len())));
+                let points = quadrature.weight.iter().enumerate();
                 mean(points.map(|(lane, &w)| (found.fields(part, cell, lane), w)), part.cells.volume(cell))
             }
             Cells::Membrane(block, sheets) => {

@@ -182,12 +182,12 @@ impl Monitor {
         let solids = self.solids.iter().zip(&model.solids).enumerate();
         solids
             .filter_map(|(index, (watch, solid))| {
-                let all: Vec<u32> = (0..solid.cells.len() as u32).collect();
+                let numbers: Vec<u32> = (0..solid.cells.len() as u32).collect();
                 let least = |cells: &[u32]| {
                     let found = watch.check(model, solid, displacement, reference, cells);
                     smallest(&found, cells)
                 };
-                let least = all.par_chunks(PACK).map(least).reduce(|| None, smaller);
+                let least = numbers.par_chunks(PACK).map(least).reduce(|| None, smaller);
                 least.map(|(limit, cell)| (damped(limit, model.stiffness_damping), index, cell))
             })
             .min_by(|a, b| a.0.total_cmp(&b.0))
@@ -227,8 +227,8 @@ impl Watch {
     /// Σ B_a ⊗ B_a [1/m²] of a cell.
     fn square(&self, cell: usize) -> Symmetric<f64> {
         let mut square = Symmetric::ZERO;
-        for (own, pack) in square.0.iter_mut().zip(&self.square[cell / PACK].0) {
-            *own = pack.0[cell % PACK];
+        for (entry, pack) in square.0.iter_mut().zip(&self.square[cell / PACK].0) {
+            *entry = pack.0[cell % PACK];
         }
         square
     }
@@ -268,7 +268,7 @@ impl Watch {
             if half < order.len() {
                 order.select_nth_unstable(half);
             }
-            picked.iter_mut().zip(order).for_each(|(picked, own)| *picked = *own as u32);
+            picked.iter_mut().zip(order).for_each(|(picked, entry)| *picked = *entry as u32);
         };
         let [speeds, stretches] = &mut self.order;
         let (before, after) = self.picked.split_at_mut(half);
@@ -308,8 +308,8 @@ impl Watch {
         let in_state = |displacement: &[Vector<R>]| {
             let state = |cell: usize| (displacement_gradient(solid, cell, displacement), self.square(cell));
             let mut found = stiffness(solid, cells, state);
-            for (own, &cell) in found.iter_mut().zip(cells) {
-                own.mode = own.mode.max(self.hourglass[cell as usize] * own.hourglass);
+            for (stiffness, &cell) in found.iter_mut().zip(cells) {
+                stiffness.mode = stiffness.mode.max(self.hourglass[cell as usize] * stiffness.hourglass);
             }
             found
         };
@@ -320,8 +320,8 @@ impl Watch {
         for (lane, &cell) in cells.iter().enumerate() {
             let before = self.reference[cell as usize].unwrap_or(found_before[lane]);
             let [mode, wave] = [before.mode / now[lane].mode, before.wave / now[lane].wave].map(f64::sqrt);
-            let own = limit_alone(model, solid, cell as usize, now[lane].mode);
-            limits[lane] = (own.max(self.limit * mode.min(wave)), before);
+            let alone = limit_alone(model, solid, cell as usize, now[lane].mode);
+            limits[lane] = (alone.max(self.limit * mode.min(wave)), before);
         }
         limits
     }
@@ -366,10 +366,10 @@ fn limits_alone<R: LaneNumber>(
         |cell: usize| (displacement_gradient(solid, cell, displacement), gradient_square_of(solid, cell));
     let found = stiffness(solid, cells, state);
     let mut limits = [f64::NAN; PACK];
-    for (limit, (&cell, own)) in limits.iter_mut().zip(cells.iter().zip(&found)) {
+    for (limit, (&cell, stiffness)) in limits.iter_mut().zip(cells.iter().zip(&found)) {
         let cell = cell as usize;
-        let hourglass = hourglass_modulus(solid, cell) * own.hourglass;
-        let alone = limit_alone(model, solid, cell, own.mode.max(hourglass));
+        let hourglass = hourglass_modulus(solid, cell) * stiffness.hourglass;
+        let alone = limit_alone(model, solid, cell, stiffness.mode.max(hourglass));
         *limit = damped(alone, model.stiffness_damping);
     }
     limits
@@ -536,6 +536,6 @@ mod tests {
             [f64::NAN, f64::INFINITY, 2e9, 1.0 + 1e-6, 1.0, 1.0 + 1e-9, 1e-30, 0.0, -0.0, -1e-30, -1.0];
         let order: Vec<u64> = (0..).zip(ranks).map(|(cell, rank)| ranked(rank, cell)).collect();
         assert!(order.is_sorted(), "{order:x?}");
-        assert!((0..).zip(&order).all(|(cell, &own)| own as u32 == cell));
+        assert!((0..).zip(&order).all(|(cell, &entry)| entry as u32 == cell));
     }
 }

@@ -84,30 +84,35 @@ pub struct Work {
 
 /// Puts nodes with a prescribed mean or around a prescribed volume where they are at time 0, by displacements
 /// [m].
-fn place_collective(model: &Model, own: &Constraint, owners: &[[u32; 3]], displacement: &mut [Vector<f64>]) {
-    let missing = own.missing_mean(0.0, |node| displacement[node as usize]);
-    for &node in &own.nodes {
+fn place_collective(
+    model: &Model,
+    constraint: &Constraint,
+    owners: &[[u32; 3]],
+    displacement: &mut [Vector<f64>],
+) {
+    let missing = constraint.missing_mean(0.0, |node| displacement[node as usize]);
+    for &node in &constraint.nodes {
         displacement[node as usize] = add(displacement[node as usize], missing);
     }
-    let Motion::Volume { enclosure, by, curve } = &own.motion else { return };
+    let Motion::Volume { enclosure, by, curve } = &constraint.motion else { return };
     let volume = |displacement: &[Vector<f64>], gradient: &mut [f64]| {
         let place = |at: u32| {
-            let node = own.nodes[at as usize] as usize;
+            let node = constraint.nodes[at as usize] as usize;
             add(model.rest[node], displacement[node])
         };
-        let mut along = vec![[0.0; 3]; own.nodes.len()];
+        let mut along = vec![[0.0; 3]; constraint.nodes.len()];
         let volume = enclosure.add_gradient(place, &mut along);
-        for ((to, from), &node) in gradient.chunks_exact_mut(3).zip(along).zip(&own.nodes) {
+        for ((to, from), &node) in gradient.chunks_exact_mut(3).zip(along).zip(&constraint.nodes) {
             (0..3).for_each(|c| to[c] = if owners[node as usize][c] == FREE { from[c] } else { 0.0 });
         }
         volume
     };
     let advance = |displacement: &mut [Vector<f64>], gradient: &[f64], part: f64| {
-        for (by, &node) in gradient.chunks_exact(3).zip(&own.nodes) {
+        for (by, &node) in gradient.chunks_exact(3).zip(&constraint.nodes) {
             (0..3).for_each(|c| displacement[node as usize][c] += part * by[c]);
         }
     };
-    let mut gradient = vec![0.0; 3 * own.nodes.len()];
+    let mut gradient = vec![0.0; 3 * constraint.nodes.len()];
     let wanted = volume(&vec![[0.0; 3]; model.node_count()], &mut gradient) + by * curve.value(0.0);
     fill(displacement, wanted, &mut gradient, volume, advance);
 }
@@ -125,8 +130,8 @@ impl<R: LaneNumber> State<R> {
                     u[component] = placed(model::component(&amplitudes, component), motion.factors(0.0));
                 }
             }
-            for own in &model.constraints {
-                place_collective(model, own, &owners, &mut displacement);
+            for constraint in &model.constraints {
+                place_collective(model, constraint, &owners, &mut displacement);
             }
         }
         model.follow(&mut displacement);
@@ -161,7 +166,7 @@ impl<R: LaneNumber> State<R> {
     /// Returns the way of a tool or a jaw that was driven; `rigid` counts among the rigid things of the
     /// contacts.
     pub fn leg(&self, rigid: usize) -> Option<&Leg> {
-        self.driven.iter().find(|(own, _)| *own as usize == rigid).map(|(_, leg)| leg)
+        self.driven.iter().find(|(number, _)| *number as usize == rigid).map(|(_, leg)| leg)
     }
 
     /// Returns the lag of a rigid thing behind its trajectory, if its force is limited.
@@ -171,7 +176,7 @@ impl<R: LaneNumber> State<R> {
 
     /// Drives a tool or a jaw from the step on that follows.
     pub fn drive(&mut self, rigid: usize, leg: Leg) {
-        self.driven.retain(|(own, _)| *own as usize != rigid);
+        self.driven.retain(|(number, _)| *number as usize != rigid);
         self.driven.push((rigid as u32, leg));
     }
 

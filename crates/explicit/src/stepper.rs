@@ -186,8 +186,8 @@ impl<R: SteppedIn> Observable<R> for CentralDifference<R> {
     }
 
     fn reaction(&self, constraint: usize) -> Vector<f64> {
-        match self.collectives.iter().find(|own| own.constraint == constraint) {
-            Some(own) => own.force,
+        match self.collectives.iter().find(|collective| collective.constraint == constraint) {
+            Some(collective) => collective.force,
             None => sum_owned(&self.model, &self.owners, constraint, &self.reaction),
         }
     }
@@ -215,15 +215,15 @@ impl<R: SteppedIn> Observable<R> for CentralDifference<R> {
     }
 
     fn velocity(&self, state: &State<R>, node: usize) -> Vector<f64> {
-        let own = |node: u32| {
+        let velocity = |node: u32| {
             let (before, after) = (state.increment[node as usize], self.next[node as usize]);
             [0, 1, 2].map(|c| self.lengths.velocity(before[c].to_f64(), after[c].to_f64()))
         };
-        let alone = own(node as u32);
+        let alone = velocity(node as u32);
         if self.model.ties.is_empty() {
             return alone;
         }
-        let followed = weighted(self.model.resolved(&[(node as u32, 1.0)]), own);
+        let followed = weighted(self.model.resolved(&[(node as u32, 1.0)]), velocity);
         [0, 1, 2].map(|c| if self.owners[node][c] == FREE { followed[c] } else { alone[c] })
     }
 }
@@ -286,7 +286,7 @@ impl<R: SteppedIn> CentralDifference<R> {
             owners,
             damping,
             applied,
-            collectives: Collective::all(&model),
+            collectives: Collective::of_model(&model),
             contact: None,
             dissipates: false,
             processor: Processor::detect(),
@@ -592,26 +592,27 @@ impl<R: SteppedIn> CentralDifference<R> {
     fn bind(&mut self, state: &State<R>) -> bool {
         let mut collectives = std::mem::take(&mut self.collectives);
         let at_start = state.is_at_start();
-        for own in &mut collectives {
-            let then = self.factors[own.constraint][1][0];
-            own.enclosed.pressure = 0.0;
+        for collective in &mut collectives {
+            let then = self.factors[collective.constraint][1][0];
+            collective.enclosed.pressure = 0.0;
             let predicted = |node: u32| {
-                let mut own = self.predicted(state, node);
+                let mut prediction = self.predicted(state, node);
                 if at_start {
-                    own.mobility = 0.5 * self.lengths.next.powi(2) / self.mass[node as usize][0].to_f64();
+                    prediction.mobility =
+                        0.5 * self.lengths.next.powi(2) / self.mass[node as usize][0].to_f64();
                 }
-                if own.held == [false; 3] {
-                    return own;
+                if prediction.held == [false; 3] {
+                    return prediction;
                 }
                 if let Ok(at) = self.held.binary_search_by_key(&node, |held| held.node) {
                     for (c, constraint) in self.held[at].components() {
-                        own.displacement[c] = self.held[at].place(c, self.factors[constraint][1]);
+                        prediction.displacement[c] = self.held[at].place(c, self.factors[constraint][1]);
                     }
                 }
-                own
+                prediction
             };
-            own.find(&self.model, predicted, then);
-            for (node, force) in own.forces(&self.model) {
+            collective.find(&self.model, predicted, then);
+            for (node, force) in collective.forces(&self.model) {
                 self.applied.add(node, force);
             }
         }

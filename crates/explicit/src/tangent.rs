@@ -208,8 +208,8 @@ impl Tangents<'_> {
                 [first_piola_kirchhoff::<L>(batch, 0, at), first_piola_kirchhoff(batch, 1, at)];
             let change = ahead.plus_scaled(&behind, -L::ONE).scaled(L::of(0.5 / DIFFERENCE));
             for (k, row) in change.0.into_iter().enumerate() {
-                for (q, &own) in columns.iter().enumerate() {
-                    dot(row, own).store(&mut matrix[3 * k + q][column], at);
+                for (q, &factor) in columns.iter().enumerate() {
+                    dot(row, factor).store(&mut matrix[3 * k + q][column], at);
                 }
             }
         }
@@ -247,13 +247,13 @@ fn stiffest_wave<N: Number>(a: &Matrix<N>) -> N {
     for other in &BEGINNINGS[1..] {
         let length = dot(*other, *other).sqrt();
         let other = [N::of(other[0] / length), N::of(other[1] / length), N::of(other[2] / length)];
-        let own = largest_of_three(&along(a, other));
+        let eigenvalue = largest_of_three(&along(a, other));
         // One where it is larger, and zero elsewhere.
-        let better = N::of(0.5) * (N::ONE + N::ONE.copysign(own - largest));
+        let better = N::of(0.5) * (N::ONE + N::ONE.copysign(eigenvalue - largest));
         for (y, other) in y.iter_mut().zip(other) {
             *y += better * (other - *y);
         }
-        largest = largest.max(own);
+        largest = largest.max(eigenvalue);
     }
     let mut n = y;
     for _ in 0..TURNS {
@@ -285,9 +285,9 @@ fn across<N: Number>(a: &Matrix<N>, n: Vector<N>) -> Symmetric<N> {
 fn contracted<N: Number>(a: &Matrix<N>, with: Vector<N>, kept: usize, over: usize) -> Symmetric<N> {
     let mut found = Symmetric::ZERO;
     for (entry, [i, k]) in found.0.iter_mut().zip(ENTRIES) {
-        for (p, &own) in with.iter().enumerate() {
+        for (p, &component) in with.iter().enumerate() {
             let (row, first) = (&a[kept * i + over * p], kept * k);
-            *entry += own * dot([row[first], row[first + over], row[first + 2 * over]], with);
+            *entry += component * dot([row[first], row[first + over], row[first + 2 * over]], with);
         }
     }
     found

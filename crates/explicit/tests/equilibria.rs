@@ -22,14 +22,14 @@ fn claim(what: &str, found: f64, limit: f64) {
 fn block(counts: [u32; 3], edge: f64, element: &str, poisson: f64, prony: Prony) -> Model {
     let [nx, ny, nz] = counts.map(|count| count + 1);
     let number = |[x, y, z]: [u32; 3]| (z * ny + y) * nx + x;
-    let all = |[mx, my, mz]: [u32; 3]| {
+    let grid = |[mx, my, mz]: [u32; 3]| {
         (0..mz).flat_map(move |z| (0..my).flat_map(move |y| (0..mx).map(move |x| [x, y, z])))
     };
-    let rest: Vec<[f64; 3]> = all([nx, ny, nz]).map(|at| at.map(|i| f64::from(i) * edge)).collect();
+    let rest: Vec<[f64; 3]> = grid([nx, ny, nz]).map(|at| at.map(|i| f64::from(i) * edge)).collect();
     const CORNERS: [[u32; 3]; 8] =
         [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]];
     let hexes: Vec<[u32; 8]> =
-        all(counts).map(|at| CORNERS.map(|corner| number([0, 1, 2].map(|c| at[c] + corner[c])))).collect();
+        grid(counts).map(|at| CORNERS.map(|corner| number([0, 1, 2].map(|c| at[c] + corner[c])))).collect();
     // Kuhn's split: all six tets around the diagonal 0–6.
     const KUHN: [[usize; 4]; 6] =
         [[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]];
@@ -232,7 +232,7 @@ fn single_precision_bends_a_slender_beam_as_far() {
             solver.way().displacement_error,
         )
     }
-    let [(single, told), (double, _)] = [bent::<f32>(&beam), bent::<f64>(&beam)];
+    let [(single, reported), (double, _)] = [bent::<f32>(&beam), bent::<f64>(&beam)];
     claim("single precision: deflection", (single / double - 1.0).abs(), 2e-3);
-    assert!(told <= 1e-3, "{told}");
+    assert!(reported <= 1e-3, "{reported}");
 }

@@ -107,10 +107,10 @@ impl Factors {
     /// Factors a matrix; `None` if it holds a number that is not finite.
     pub(crate) fn factorise(&mut self, matrix: &LowerMatrix) -> Option<Pivots> {
         for (diagonal, &equation) in self.diagonal.iter_mut().zip(&self.supernodes.order) {
-            let own = matrix.diagonal(equation as usize).abs();
-            *diagonal = if own > 0.0 { own } else { 1.0 };
+            let entry = matrix.diagonal(equation as usize).abs();
+            *diagonal = if entry > 0.0 { entry } else { 1.0 };
         }
-        self.arch.dispatch(Factorise { own: self, matrix });
+        self.arch.dispatch(Factorise { factors: self, matrix });
         let mut pivots = Pivots { smallest: f64::INFINITY, ..Pivots::default() };
         let columns = self.pivot.iter().zip(&self.diagonal).zip(&self.supernodes.order);
         for ((&pivot, diagonal), &equation) in columns {
@@ -132,23 +132,23 @@ impl Factors {
     pub fn solve(&mut self, x: &mut [f64]) {
         let Self { supernodes, shares: [middle, end], value, pivot, memory, arch, .. } = self;
         let Memory { right, below: [below, below_other], taken: [taken, taken_other], .. } = memory;
-        for (own, &equation) in right.iter_mut().zip(&supernodes.order) {
-            *own = x[equation as usize];
+        for (entry, &equation) in right.iter_mut().zip(&supernodes.order) {
+            *entry = x[equation as usize];
         }
-        let (arch, all, count) = (*arch, supernodes.nodes.len(), right.len());
+        let (arch, node_count, count) = (*arch, supernodes.nodes.len(), right.len());
         let [first, beyond] = [*middle, *end].map(|node| supernodes.column(node));
         let (shared, rest) = right.split_at_mut(beyond);
         let (one, other) = shared.split_at_mut(first);
         let share = |nodes, beyond| Share { supernodes, value, pivot, nodes, beyond };
         let (a, b, last) =
-            (share([0, *middle], beyond), share([*middle, *end], beyond), share([*end, all], count));
+            (share([0, *middle], beyond), share([*middle, *end], beyond), share([*end, node_count], count));
         join(
             *middle < *end,
             || arch.dispatch(Forward { share: &a, right: one, rest: taken, below }),
             || arch.dispatch(Forward { share: &b, right: other, rest: taken_other, below: below_other }),
         );
-        for ((own, one), other) in rest.iter_mut().zip(&*taken).zip(&*taken_other) {
-            *own -= one + other;
+        for ((entry, one), other) in rest.iter_mut().zip(&*taken).zip(&*taken_other) {
+            *entry -= one + other;
         }
         arch.dispatch(Forward { share: &last, right: rest, rest: &mut [], below });
         arch.dispatch(Backward { share: &last, right: rest, rest: &[], below });
@@ -157,8 +157,8 @@ impl Factors {
             || arch.dispatch(Backward { share: &a, right: one, rest, below }),
             || arch.dispatch(Backward { share: &b, right: other, rest, below: below_other }),
         );
-        for (own, &equation) in right.iter().zip(&supernodes.order) {
-            x[equation as usize] = *own;
+        for (entry, &equation) in right.iter().zip(&supernodes.order) {
+            x[equation as usize] = *entry;
         }
     }
 }
@@ -173,7 +173,7 @@ fn join(shared: bool, one: impl FnOnce() + Send, other: impl FnOnce() + Send) {
 }
 
 struct Factorise<'a> {
-    own: &'a mut Factors,
+    factors: &'a mut Factors,
     matrix: &'a LowerMatrix,
 }
 
@@ -182,16 +182,16 @@ impl WithSimd for Factorise<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Factors { supernodes, value, pivot, diagonal, memory, .. } = self.own;
+        let Factors { supernodes, value, pivot, diagonal, memory, .. } = self.factors;
         let Memory { scaled, stacks: [even, odd], waiting, .. } = memory;
         let mut used = [0; 2];
         for (number, node) in supernodes.nodes.iter().enumerate() {
             let (width, height, edge) = (node.width, node.height(), padded(node.width));
             let panel = &mut value[node.value..node.value + height * width];
             fill(supernodes, node, self.matrix, panel);
-            let (own, other) = (node.depth % 2, 1 - node.depth % 2);
-            let (mine, theirs) = if own == 0 { (&mut *even, &*odd) } else { (&mut *odd, &*even) };
-            let left = &mut mine[used[own]..used[own] + left_of(node)];
+            let (stack, other) = (node.depth % 2, 1 - node.depth % 2);
+            let (mine, theirs) = if stack == 0 { (&mut *even, &*odd) } else { (&mut *odd, &*even) };
+            let left = &mut mine[used[stack]..used[stack] + left_of(node)];
             let from_children = |columns: &mut [f64], height: usize, range: [usize; 2]| {
                 let mut end = used[other];
                 for &child in waiting[waiting.len() - node.children..].iter().rev() {
@@ -213,7 +213,7 @@ impl WithSimd for Factorise<'_> {
             };
             eliminate(simd, panel, width, scaled, left, pivots);
             used[other] = from_children(left, height - edge, [edge, usize::MAX]);
-            used[own] += left_of(node);
+            used[stack] += left_of(node);
             waiting.truncate(waiting.len() - node.children);
             waiting.push(number);
         }
@@ -282,14 +282,14 @@ impl WithSimd for Forward<'_> {
         for node in share.nodes() {
             let (width, height, edge) = (node.width, node.height(), padded(node.width));
             let panel = &share.value[node.value..node.value + height * width];
-            let own = &mut right[node.first - first..][..width];
+            let unknowns = &mut right[node.first - first..][..width];
             for (c, column) in panel.chunks_exact(height).enumerate() {
-                let (before, after) = own.split_at_mut(c + 1);
+                let (before, after) = unknowns.split_at_mut(c + 1);
                 let lower = &column[c + 1..width];
                 after.iter_mut().zip(lower).for_each(|(after, lower)| *after -= before[c] * lower);
             }
             let sums = &mut below[..height - edge];
-            multiply(simd, panel, own, edge, sums);
+            multiply(simd, panel, unknowns, edge, sums);
             for (row, sum) in share.supernodes.rows(node).iter().map(|&row| row as usize).zip(&*sums) {
                 if row < beyond {
                     right[row - first] -= sum;
@@ -298,7 +298,7 @@ impl WithSimd for Forward<'_> {
                 }
             }
         }
-        right.iter_mut().zip(&share.pivot[first..]).for_each(|(own, pivot)| *own /= pivot);
+        right.iter_mut().zip(&share.pivot[first..]).for_each(|(entry, pivot)| *entry /= pivot);
     }
 }
 
@@ -325,10 +325,10 @@ impl WithSimd for Backward<'_> {
             for (row, below) in share.supernodes.rows(node).iter().map(|&row| row as usize).zip(&mut *below) {
                 *below = if row < beyond { right[row - first] } else { rest[row - beyond] };
             }
-            let own = &mut right[node.first - first..][..width];
+            let unknowns = &mut right[node.first - first..][..width];
             for (c, column) in panel.chunks_exact(height).enumerate().rev() {
-                let lower = column[c + 1..width].iter().zip(&own[c + 1..]);
-                own[c] -= dot(simd, &column[edge..], below) + lower.map(|(l, x)| l * x).sum::<f64>();
+                let lower = column[c + 1..width].iter().zip(&unknowns[c + 1..]);
+                unknowns[c] -= dot(simd, &column[edge..], below) + lower.map(|(l, x)| l * x).sum::<f64>();
             }
         }
     }

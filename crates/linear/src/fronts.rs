@@ -117,18 +117,18 @@ impl Strip<'_> {
     /// Subtracts columns before the strip from the strip.
     #[inline(always)]
     fn take_off<S: Simd, const C: usize, const R: usize>(&mut self, simd: S, row: usize) {
-        let mut own: Tile<S, C, R> = [[simd.splat_f64s(0.0); R]; C];
-        self.load_rows::<S, C, R>(row, &mut own);
-        self.less_columns::<S, C, R>(simd, row, &mut own);
+        let mut tile: Tile<S, C, R> = [[simd.splat_f64s(0.0); R]; C];
+        self.load_rows::<S, C, R>(row, &mut tile);
+        self.less_columns::<S, C, R>(simd, row, &mut tile);
         for c in 0..C {
-            store::<S, R>(&own[c], &mut self.columns[(self.at + c) * self.height + row..]);
+            store::<S, R>(&tile[c], &mut self.columns[(self.at + c) * self.height + row..]);
         }
     }
 
     #[inline(always)]
-    fn load_rows<S: Simd, const C: usize, const R: usize>(&self, row: usize, own: &mut Tile<S, C, R>) {
+    fn load_rows<S: Simd, const C: usize, const R: usize>(&self, row: usize, tile: &mut Tile<S, C, R>) {
         for c in 0..C {
-            load::<S, R>(&self.columns[(self.at + c) * self.height + row..], &mut own[c]);
+            load::<S, R>(&self.columns[(self.at + c) * self.height + row..], &mut tile[c]);
         }
     }
 
@@ -137,10 +137,10 @@ impl Strip<'_> {
         &self,
         simd: S,
         row: usize,
-        own: &mut Tile<S, C, R>,
+        tile: &mut Tile<S, C, R>,
     ) {
         let Self { columns, scaled, height, block, at } = self;
-        less_products::<S, C, R>(simd, own, [scaled, columns], *height, *at, [row, block + at]);
+        less_products::<S, C, R>(simd, tile, [scaled, columns], *height, *at, [row, block + at]);
     }
 
     /// Solves for L D and L of some rows below the columns of the strip; whose columns before are taken off
@@ -153,10 +153,10 @@ impl Strip<'_> {
         corner: &Corner<C>,
         is_reached: bool,
     ) {
-        let mut own: Tile<S, C, R> = [[simd.splat_f64s(0.0); R]; C];
-        self.load_rows::<S, C, R>(row, &mut own);
+        let mut tile: Tile<S, C, R> = [[simd.splat_f64s(0.0); R]; C];
+        self.load_rows::<S, C, R>(row, &mut tile);
         if !is_reached {
-            self.less_columns::<S, C, R>(simd, row, &mut own);
+            self.less_columns::<S, C, R>(simd, row, &mut tile);
         }
         // Written out: numbers that a variable index chooses would not stay in registers.
         macro_rules! column {
@@ -165,15 +165,15 @@ impl Strip<'_> {
                     $({
                         let l = simd.splat_f64s(corner.lower[$c][$before]);
                         for r in 0..R {
-                            own[$c][r] = simd.negate_mul_add_e_f64s(own[$before][r], l, own[$c][r]);
+                            tile[$c][r] = simd.negate_mul_add_e_f64s(tile[$before][r], l, tile[$c][r]);
                         }
                     })*
                     let at = (self.at + $c) * self.height + row;
-                    store::<S, R>(&own[$c], &mut self.scaled[at..]);
+                    store::<S, R>(&tile[$c], &mut self.scaled[at..]);
                     let inverse = simd.splat_f64s(corner.inverse[$c]);
-                    let mut lower = own[$c];
+                    let mut lower = tile[$c];
                     for r in 0..R {
-                        lower[r] = simd.mul_f64s(own[$c][r], inverse);
+                        lower[r] = simd.mul_f64s(tile[$c][r], inverse);
                     }
                     store::<S, R>(&lower, &mut self.columns[at..]);
                 }
@@ -191,13 +191,13 @@ impl Strip<'_> {
     #[inline(always)]
     fn corner<const C: usize>(&self, pivots: &mut PivotColumns<'_>) -> Corner<C> {
         let first = self.block + self.at;
-        let mut own = [[0.0; C]; C];
+        let mut entries = [[0.0; C]; C];
         for c in 0..C {
-            own[c].copy_from_slice(&self.columns[(self.at + c) * self.height + first..][..C]);
+            entries[c].copy_from_slice(&self.columns[(self.at + c) * self.height + first..][..C]);
         }
         let mut corner = Corner { lower: [[0.0; C]; C], inverse: [0.0; C] };
         for c in 0..C {
-            let mut pivot = own[c][c];
+            let mut pivot = entries[c][c];
             let tiny = pivots.tiny * pivots.diagonal[first + c];
             if pivot.abs() < tiny {
                 pivot = tiny.copysign(pivot);
@@ -206,11 +206,11 @@ impl Strip<'_> {
             let inverse = 1.0 / pivot;
             corner.inverse[c] = inverse;
             for r in c + 1..C {
-                corner.lower[r][c] = own[c][r] * inverse;
+                corner.lower[r][c] = entries[c][r] * inverse;
             }
             for right in c + 1..C {
                 for r in right..C {
-                    own[right][r] -= corner.lower[right][c] * own[c][r];
+                    entries[right][r] -= corner.lower[right][c] * entries[c][r];
                 }
             }
         }
@@ -233,7 +233,7 @@ impl Strip<'_> {
 #[inline(always)]
 fn less_products<S: Simd, const C: usize, const R: usize>(
     simd: S,
-    own: &mut Tile<S, C, R>,
+    tile: &mut Tile<S, C, R>,
     [scaled, lower]: [&[f64]; 2],
     height: usize,
     count: usize,
@@ -246,7 +246,7 @@ fn less_products<S: Simd, const C: usize, const R: usize>(
         for c in 0..C {
             let l = simd.splat_f64s(there[c]);
             for r in 0..R {
-                own[c][r] = simd.negate_mul_add_e_f64s(here[r], l, own[c][r]);
+                tile[c][r] = simd.negate_mul_add_e_f64s(here[r], l, tile[c][r]);
             }
         }
     }
@@ -286,16 +286,16 @@ impl Rest<'_> {
         [column, row]: [usize; 2],
     ) {
         let first = (column - self.range[0]) * self.height + row;
-        let mut own: Tile<S, C, R> = [[simd.splat_f64s(0.0); R]; C];
+        let mut tile: Tile<S, C, R> = [[simd.splat_f64s(0.0); R]; C];
         if !self.is_new {
             for c in 0..C {
-                load::<S, R>(&self.columns[first + c * self.height..], &mut own[c]);
+                load::<S, R>(&self.columns[first + c * self.height..], &mut tile[c]);
             }
         }
         let places = [self.shift + row, self.shift + column];
-        less_products::<S, C, R>(simd, &mut own, of, height, count, places);
+        less_products::<S, C, R>(simd, &mut tile, of, height, count, places);
         for c in 0..C {
-            store::<S, R>(&own[c], &mut self.columns[first + c * self.height..]);
+            store::<S, R>(&tile[c], &mut self.columns[first + c * self.height..]);
         }
     }
 }
@@ -346,7 +346,7 @@ impl Left<'_> {
     pub(crate) fn add_to(&self, columns: &mut [f64], height: usize, [from, to]: [usize; 2]) {
         let is_there = |run: &Run| (from..to).contains(&(run.to as usize));
         for (number, across) in self.runs.iter().enumerate().filter(|(_, run)| is_there(run)) {
-            let own =
+            let numbers =
                 &self.numbers[across.from as usize * self.height..][..across.len as usize * self.height];
             let to = &mut columns[(across.to as usize - from) * height..][..across.len as usize * height];
             // Of its own rows those above the diagonal go along: nobody looks at them.
@@ -356,15 +356,16 @@ impl Left<'_> {
                 // calls.
                 macro_rules! add_columns {
                     ($add:expr) => {
-                        for (own, to) in own.chunks_exact(self.height).zip(to.chunks_exact_mut(height)) {
-                            $add(own, to, places);
+                        for (column, to) in numbers.chunks_exact(self.height).zip(to.chunks_exact_mut(height))
+                        {
+                            $add(column, to, places);
                         }
                     };
                 }
                 match run.len {
                     3 => add_columns!(add::<3>),
                     6 => add_columns!(add::<6>),
-                    len => add_columns!(|own, to, places| add_all(own, to, places, len as usize)),
+                    len => add_columns!(|column, to, places| add_all(column, to, places, len as usize)),
                 }
             }
         }
@@ -373,8 +374,8 @@ impl Left<'_> {
 
 /// Adds `N` numbers from a place on to others.
 #[inline(always)]
-fn add<const N: usize>(from: &[f64], to: &mut [f64], [own, other]: [usize; 2]) {
-    let (to, from) = (&mut to[other..other + N], &from[own..own + N]);
+fn add<const N: usize>(from: &[f64], to: &mut [f64], [source, other]: [usize; 2]) {
+    let (to, from) = (&mut to[other..other + N], &from[source..source + N]);
     for i in 0..N {
         to[i] += from[i];
     }
@@ -409,16 +410,16 @@ fn add_all(from: &[f64], to: &mut [f64], places: [usize; 2], len: usize) {
 pub(crate) fn multiply<S: Simd>(simd: S, panel: &[f64], numbers: &[f64], from: usize, sums: &mut [f64]) {
     let height = panel.len() / numbers.len();
     for_rows!(simd, 0, sums.len(), row, R => {
-        let mut own = [simd.splat_f64s(0.0); R];
-        let mut entry = own;
+        let mut totals = [simd.splat_f64s(0.0); R];
+        let mut entry = totals;
         for (column, number) in numbers.iter().enumerate() {
             let number = simd.splat_f64s(*number);
             load::<S, R>(&panel[column * height + from + row..], &mut entry);
             for r in 0..R {
-                own[r] = simd.mul_add_e_f64s(entry[r], number, own[r]);
+                totals[r] = simd.mul_add_e_f64s(entry[r], number, totals[r]);
             }
         }
-        store::<S, R>(&own, &mut sums[row..]);
+        store::<S, R>(&totals, &mut sums[row..]);
     });
 }
 

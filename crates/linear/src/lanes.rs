@@ -15,26 +15,26 @@ pub type Pack = [f64; PACK];
 #[derive(Clone, Copy, Debug)]
 pub struct Lane<S: Simd> {
     simd: S,
-    own: S::f64s,
+    numbers: S::f64s,
 }
 
 impl<S: Simd> Lane<S> {
     /// Loads the numbers of one register of a pack.
     #[inline(always)]
     pub fn load(simd: S, pack: &Pack, register: usize) -> Self {
-        Self { simd, own: S::as_simd_f64s(&pack[..]).0[register] }
+        Self { simd, numbers: S::as_simd_f64s(&pack[..]).0[register] }
     }
 
     /// Writes them into a pack.
     #[inline(always)]
     pub fn store(self, pack: &mut Pack, register: usize) {
-        S::as_mut_simd_f64s(&mut pack[..]).0[register] = self.own;
+        S::as_mut_simd_f64s(&mut pack[..]).0[register] = self.numbers;
     }
 
     /// One number in all lanes.
     #[inline(always)]
     pub fn splat(simd: S, number: f64) -> Self {
-        Self { simd, own: simd.splat_f64s(number) }
+        Self { simd, numbers: simd.splat_f64s(number) }
     }
 
     /// Half of each number.
@@ -46,32 +46,32 @@ impl<S: Simd> Lane<S> {
     /// This over another.
     #[inline(always)]
     pub fn over(self, other: Self) -> Self {
-        Self { simd: self.simd, own: self.simd.div_f64s(self.own, other.own) }
+        Self { simd: self.simd, numbers: self.simd.div_f64s(self.numbers, other.numbers) }
     }
 
     /// Its square root.
     #[inline(always)]
     pub fn sqrt(self) -> Self {
-        Self { simd: self.simd, own: self.simd.sqrt_f64s(self.own) }
+        Self { simd: self.simd, numbers: self.simd.sqrt_f64s(self.numbers) }
     }
 
     /// Selects the first of two numbers in lanes where this is less than another number, and else the second.
     #[inline(always)]
     pub fn if_less(self, than: Self, then: Self, other: Self) -> Self {
-        let mask = self.simd.less_than_f64s(self.own, than.own);
-        Self { simd: self.simd, own: self.simd.select_f64s(mask, then.own, other.own) }
+        let mask = self.simd.less_than_f64s(self.numbers, than.numbers);
+        Self { simd: self.simd, numbers: self.simd.select_f64s(mask, then.numbers, other.numbers) }
     }
 
     /// a b + this.
     #[inline(always)]
     pub fn plus(self, a: Self, b: Self) -> Self {
-        Self { simd: self.simd, own: self.simd.mul_add_e_f64s(a.own, b.own, self.own) }
+        Self { simd: self.simd, numbers: self.simd.mul_add_e_f64s(a.numbers, b.numbers, self.numbers) }
     }
 
     /// This − a b.
     #[inline(always)]
     pub fn less(self, a: Self, b: Self) -> Self {
-        Self { simd: self.simd, own: self.simd.negate_mul_add_e_f64s(a.own, b.own, self.own) }
+        Self { simd: self.simd, numbers: self.simd.negate_mul_add_e_f64s(a.numbers, b.numbers, self.numbers) }
     }
 }
 
@@ -79,7 +79,7 @@ impl<S: Simd> Add for Lane<S> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        Self { simd: self.simd, own: self.simd.add_f64s(self.own, other.own) }
+        Self { simd: self.simd, numbers: self.simd.add_f64s(self.numbers, other.numbers) }
     }
 }
 
@@ -87,7 +87,7 @@ impl<S: Simd> Sub for Lane<S> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
-        Self { simd: self.simd, own: self.simd.sub_f64s(self.own, other.own) }
+        Self { simd: self.simd, numbers: self.simd.sub_f64s(self.numbers, other.numbers) }
     }
 }
 
@@ -95,7 +95,7 @@ impl<S: Simd> Mul for Lane<S> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
-        Self { simd: self.simd, own: self.simd.mul_f64s(self.own, other.own) }
+        Self { simd: self.simd, numbers: self.simd.mul_f64s(self.numbers, other.numbers) }
     }
 }
 
@@ -103,7 +103,7 @@ impl<S: Simd> Neg for Lane<S> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Self { simd: self.simd, own: self.simd.neg_f64s(self.own) }
+        Self { simd: self.simd, numbers: self.simd.neg_f64s(self.numbers) }
     }
 }
 

@@ -148,12 +148,12 @@ impl Workspace {
                 let kept = before.as_mut().and_then(|before| before.on_device.take());
                 let solver = kept.map_or_else(|| device.solver(), |kept| Ok(kept.into_solver()));
                 let solver = solver.map_err(LinearError::Device)?;
-                let mut own = OnDevice::new(solver, matrix, blocks, coarse.as_ref());
+                let mut on_device = OnDevice::new(solver, matrix, blocks, coarse.as_ref());
                 // A matrix that is too large from the start is refused before a run begins.
                 if before.is_none() && !empty {
-                    own.arrange(blocks, coarse.as_ref()).map_err(LinearError::Device)?;
+                    on_device.arrange(blocks, coarse.as_ref()).map_err(LinearError::Device)?;
                 }
-                Some(own)
+                Some(on_device)
             }
             _ => None,
         };
@@ -315,9 +315,10 @@ impl Workspace {
         match &self.blocks {
             Some(blocks) => {
                 let report = self.vectors.solve(blocks, inverse, b, x, tolerance, iterations - done);
-                let all = |own: LinearReport| LinearReport { iterations: own.iterations + done, ..own };
-                report.map(all).map_err(|error| match error {
-                    LinearError::Stalled(report) => LinearError::Stalled(all(report)),
+                let counted =
+                    |report: LinearReport| LinearReport { iterations: report.iterations + done, ..report };
+                report.map(counted).map_err(|error| match error {
+                    LinearError::Stalled(report) => LinearError::Stalled(counted(report)),
                     other => other,
                 })
             }

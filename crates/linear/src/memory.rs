@@ -45,8 +45,8 @@ pub fn in_words(bytes: u64) -> String {
 /// Bytes of memory that are free, or would be without the system's copies of files; `None` where the system
 /// does not say.
 pub fn free() -> Option<u64> {
-    let told = fs::read_to_string("/proc/meminfo").ok()?;
-    let line = told.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    let meminfo = fs::read_to_string("/proc/meminfo").ok()?;
+    let line = meminfo.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
     line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?.checked_mul(1024)
 }
 
@@ -64,9 +64,9 @@ pub fn room_for(bytes: u64) -> Result<(), OutOfMemory> {
 /// # Errors
 /// If the system has no room for them.
 pub fn zeros(count: usize) -> Result<Vec<f64>, OutOfMemory> {
-    let mut all = reserved(count)?;
-    all.resize(count, 0.0);
-    Ok(all)
+    let mut array = reserved(count)?;
+    array.resize(count, 0.0);
+    Ok(array)
 }
 
 /// An empty array with room for `count` entries.
@@ -78,7 +78,7 @@ fn reserved<T>(count: usize) -> Result<Vec<T>, OutOfMemory> {
     {
         return Err(OutOfMemory { bytes, free: Some(free) });
     }
-    let mut all = Vec::new();
-    all.try_reserve_exact(count).map_err(|_| OutOfMemory { bytes, free: None })?;
-    Ok(all)
+    let mut array = Vec::new();
+    array.try_reserve_exact(count).map_err(|_| OutOfMemory { bytes, free: None })?;
+    Ok(array)
 }

@@ -50,7 +50,7 @@ impl OnDevice {
         coarse: Option<&Coarse>,
     ) -> Self {
         let numbers = 6 * blocks.nodes();
-        let [nodes, pairs] = coarse.map_or([0; 2], |own| [own.parts().0.len(), own.parts().1.len()]);
+        let [nodes, pairs] = coarse.map_or([0; 2], |coarse| [coarse.parts().0.len(), coarse.parts().1.len()]);
         Self {
             solver,
             is_arranged: false,

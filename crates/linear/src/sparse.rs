@@ -62,8 +62,8 @@ impl Equations {
 
     /// The first equation of a node, if any.
     fn first(&self, node: u32) -> u32 {
-        let own = &self.number[6 * node as usize..6 * node as usize + 6];
-        own.iter().copied().min().unwrap_or(NONE)
+        let numbers = &self.number[6 * node as usize..6 * node as usize + 6];
+        numbers.iter().copied().min().unwrap_or(NONE)
     }
 }
 
@@ -105,10 +105,10 @@ impl Values<'_> {
     ) {
         if columns.len() <= ADDED {
             for column in columns {
-                let (at, own) = (column_start[column] as usize - self.first, value(column));
-                self.value[at] += own;
+                let (at, added) = (column_start[column] as usize - self.first, value(column));
+                self.value[at] += added;
                 if let Some(mirror) = self.mirror.get_mut(at) {
-                    *mirror += own;
+                    *mirror += added;
                 }
             }
             return;
@@ -144,15 +144,15 @@ impl Values<'_> {
                 if all_free {
                     // Nearly all nodes: their rows follow one another, the rows of the column's own node from
                     // the diagonal on.
-                    let own: &[f64; C] =
+                    let part: &[f64; C] =
                         entries[j * size + a * C..].first_chunk().expect("a cell has all rows");
-                    let add = |(value, own): (&mut f64, &f64)| *value += own;
+                    let add = |(value, added): (&mut f64, &f64)| *value += added;
                     if row_node == nodes[node] {
                         let values = &mut self.value[place(column)..][..C - c];
-                        values.iter_mut().zip(&own[c..]).for_each(add);
+                        values.iter_mut().zip(&part[c..]).for_each(add);
                     } else {
                         let values = &mut self.value[place(rows[0])..][..C];
-                        values.iter_mut().zip(own).for_each(add);
+                        values.iter_mut().zip(part).for_each(add);
                     }
                     continue;
                 }
@@ -195,13 +195,13 @@ impl LowerMatrix {
             above.sort_unstable();
             above.dedup();
             aside.retain(|other| above.binary_search(other).is_err());
-            let mut all: Vec<(u32, usize)> = above.iter().map(|&other| (other, 6)).collect();
-            all.extend(aside.iter().map(|&other| (other, 3)));
-            all.sort_unstable();
-            all.dedup();
-            let own = equations.number[6 * node..6 * node + 6].iter().enumerate();
-            for (component, &column) in own.filter(|(_, e)| **e != NONE) {
-                for &(other, count) in all.iter().filter(|(_, count)| component < *count) {
+            let mut others: Vec<(u32, usize)> = above.iter().map(|&other| (other, 6)).collect();
+            others.extend(aside.iter().map(|&other| (other, 3)));
+            others.sort_unstable();
+            others.dedup();
+            let numbers = equations.number[6 * node..6 * node + 6].iter().enumerate();
+            for (component, &column) in numbers.filter(|(_, e)| **e != NONE) {
+                for &(other, count) in others.iter().filter(|(_, count)| component < *count) {
                     let rows = &equations.number[6 * other as usize..6 * other as usize + count];
                     matrix.row.extend(rows.iter().filter(|&&row| row != NONE && row >= column));
                 }
@@ -330,17 +330,17 @@ impl LowerMatrix {
 
     /// Values of an older pattern, that this one contains, in this one.
     pub fn carried(&self, older: &Self, values: &[f64]) -> Vec<f64> {
-        let mut all = vec![0.0; self.value.len()];
+        let mut carried = vec![0.0; self.value.len()];
         for column in 0..older.columns() as u32 {
             let (from, to) = (older.column_start[column as usize], self.column_start[column as usize]);
             let rows = self.rows(column);
             for (at, row) in older.rows(column).iter().enumerate() {
                 if let Ok(place) = rows.binary_search(row) {
-                    all[to as usize + place] = values[from as usize + at];
+                    carried[to as usize + place] = values[from as usize + at];
                 }
             }
         }
-        all
+        carried
     }
 
     /// Adds to a diagonal entry.
@@ -386,11 +386,11 @@ impl LowerMatrix {
         y.fill(0.0);
         for (column, bounds) in self.column_start.windows(2).enumerate() {
             let (start, end) = (bounds[0] as usize, bounds[1] as usize);
-            let own = x[column];
-            let mut sum = values[start] * own;
+            let entry = x[column];
+            let mut sum = values[start] * entry;
             for (&row, &value) in self.row[start + 1..end].iter().zip(&values[start + 1..end]) {
                 sum += value * x[row as usize];
-                y[row as usize] += value * own;
+                y[row as usize] += value * entry;
             }
             y[column] += sum;
         }

@@ -115,9 +115,9 @@ impl Groups {
         for &column in &start {
             let first = row.len();
             for &equation in matrix.rows(column) {
-                let own = group[equation as usize];
-                if row[first..].last() != Some(&own) {
-                    row.push(own);
+                let number = group[equation as usize];
+                if row[first..].last() != Some(&number) {
+                    row.push(number);
                 }
             }
             row_start.push(row.len() as u32);
@@ -152,8 +152,8 @@ impl Groups {
 }
 
 /// Makes room for more of what grows as the factors do.
-fn reserve<T>(all: &mut Vec<T>, more: usize) -> Result<(), FaerError> {
-    all.try_reserve(more).map_err(|_| FaerError::OutOfMemory)
+fn reserve<T>(list: &mut Vec<T>, more: usize) -> Result<(), FaerError> {
+    list.try_reserve(more).map_err(|_| FaerError::OutOfMemory)
 }
 
 /// A forest as lists: the first child of each and the next one of its parent.
@@ -223,65 +223,66 @@ impl Columns {
         let mut children = Children::new(count);
         let (mut row_start, mut row) = (vec![0], Vec::with_capacity(4 * above.len()));
         let (mut mark, mut is_root) = (vec![NONE; count], vec![false; count]);
-        for own in 0..count as u32 {
+        for group in 0..count as u32 {
             let first = row.len();
-            mark[own as usize] = own;
+            mark[group as usize] = group;
             let of_children = |child: u32| row_start[child as usize + 1] - row_start[child as usize];
-            let most = start[own as usize + 1] - start[own as usize]
-                + children.of(own).map(of_children).sum::<usize>();
+            let most = start[group as usize + 1] - start[group as usize]
+                + children.of(group).map(of_children).sum::<usize>();
             reserve(&mut row, most)?;
             let mut take = |other: u32, row: &mut Vec<u32>| {
-                if std::mem::replace(&mut mark[other as usize], own) != own {
+                if std::mem::replace(&mut mark[other as usize], group) != group {
                     row.push(other);
                 }
             };
-            above[start[own as usize]..start[own as usize + 1]].iter().for_each(|&q| take(q, &mut row));
-            for child in children.of(own) {
+            above[start[group as usize]..start[group as usize + 1]].iter().for_each(|&q| take(q, &mut row));
+            for child in children.of(group) {
                 for at in row_start[child as usize]..row_start[child as usize + 1] {
                     take(row[at], &mut row);
                 }
             }
             match row[first..].iter().min() {
-                Some(&parent) => children.push(parent, own),
-                None => is_root[own as usize] = true,
+                Some(&parent) => children.push(parent, group),
+                None => is_root[group as usize] = true,
             }
             row_start.push(row.len());
         }
         Ok(Self { row_start, row, children, is_root })
     }
 
-    fn rows(&self, own: u32) -> &[u32] {
-        &self.row[self.row_start[own as usize]..self.row_start[own as usize + 1]]
+    fn rows(&self, group: u32) -> &[u32] {
+        &self.row[self.row_start[group as usize]..self.row_start[group as usize + 1]]
     }
 
     /// Merges groups with their parents. Children then belong to supernodes, by their last members.
     fn merge(&mut self, size: &[usize]) -> Members {
         let count = size.len();
-        let below: Vec<usize> =
-            (0..count as u32).map(|own| self.rows(own).iter().map(|&row| size[row as usize]).sum()).collect();
+        let below: Vec<usize> = (0..count as u32)
+            .map(|group| self.rows(group).iter().map(|&row| size[row as usize]).sum())
+            .collect();
         let (mut width, mut zeros) = (size.to_vec(), vec![0; count]);
         let mut members = Members { first: (0..count as u32).collect(), next: vec![NONE; count] };
         let mut those = Vec::new();
-        for own in 0..count {
+        for group in 0..count {
             those.clear();
-            those.extend(self.children.of(own as u32));
+            those.extend(self.children.of(group as u32));
             // Those with the largest fronts leave the fewest zeros.
             those.sort_by_key(|&child| {
                 std::cmp::Reverse((below[child as usize] + width[child as usize], child))
             });
-            self.children.first[own] = NONE;
+            self.children.first[group] = NONE;
             for &child in &those {
                 let from = child as usize;
-                let new = width[from] * (width[own] + below[own] - below[from]);
-                let (wide, all) = (width[from] + width[own], zeros[from] + zeros[own] + new);
-                let part = all as f64 / (wide * (wide + 1) / 2 + wide * below[own]) as f64;
+                let new = width[from] * (width[group] + below[group] - below[from]);
+                let (wide, padding) = (width[from] + width[group], zeros[from] + zeros[group] + new);
+                let part = padding as f64 / (wide * (wide + 1) / 2 + wide * below[group]) as f64;
                 if new == 0 || ZEROS.iter().any(|&(most, zeros)| wide <= most && part <= zeros) {
-                    (width[own], zeros[own]) = (wide, all);
-                    (members.next[from], members.first[own]) = (members.first[own], members.first[from]);
+                    (width[group], zeros[group]) = (wide, padding);
+                    (members.next[from], members.first[group]) = (members.first[group], members.first[from]);
                     let its: Vec<u32> = self.children.of(child).collect();
-                    its.into_iter().for_each(|one| self.children.push(own as u32, one));
+                    its.into_iter().for_each(|one| self.children.push(group as u32, one));
                 } else {
-                    self.children.push(own as u32, child);
+                    self.children.push(group as u32, child);
                 }
             }
         }
@@ -290,12 +291,12 @@ impl Columns {
 
     /// The last members of supernodes with their depths, children just before their parents.
     fn postorder(&self) -> Vec<(u32, usize)> {
-        let roots = (0..self.is_root.len() as u32).filter(|&own| self.is_root[own as usize]);
+        let roots = (0..self.is_root.len() as u32).filter(|&group| self.is_root[group as usize]);
         let mut stack: Vec<(u32, usize)> = roots.map(|root| (root, 0)).collect();
         let mut post = Vec::new();
-        while let Some((own, depth)) = stack.pop() {
-            post.push((own, depth));
-            stack.extend(self.children.of(own).map(|child| (child, depth + 1)));
+        while let Some((last, depth)) = stack.pop() {
+            post.push((last, depth));
+            stack.extend(self.children.of(last).map(|child| (child, depth + 1)));
         }
         post.reverse();
         post
@@ -330,29 +331,29 @@ impl Supernodes {
         let size: Vec<usize> = order.iter().map(|&group| groups.size(group)).collect();
         let mut columns = Columns::new(&groups, &place)?;
         let members = columns.merge(&size);
-        let mut own = Self::default();
+        let mut supernodes = Self::default();
         // The first column of each group, by its place.
         let mut column = vec![0_u32; order.len()];
         let post = columns.postorder();
         for &(last, depth) in &post {
-            let first = own.order.len();
+            let first = supernodes.order.len();
             for member in members.of(last) {
-                column[member as usize] = own.order.len() as u32;
+                column[member as usize] = supernodes.order.len() as u32;
                 let group = order[member as usize] as usize;
-                own.order.extend(groups.start[group]..groups.start[group + 1]);
+                supernodes.order.extend(groups.start[group]..groups.start[group + 1]);
             }
-            let (width, children) = (own.order.len() - first, columns.children.of(last).count());
-            own.nodes.push(Supernode { first, width, depth, children, ..Supernode::default() });
+            let (width, children) = (supernodes.order.len() - first, columns.children.of(last).count());
+            supernodes.nodes.push(Supernode { first, width, depth, children, ..Supernode::default() });
         }
-        let mut owner = vec![0_u32; own.order.len()];
-        for (node, number) in own.nodes.iter().zip(0..) {
+        let mut owner = vec![0_u32; supernodes.order.len()];
+        for (node, number) in supernodes.nodes.iter().zip(0..) {
             owner[node.first..node.first + node.width].fill(number);
         }
-        own.set_rows(&post, &columns, &column, &size)?;
-        own.set_runs(&owner)?;
+        supernodes.set_rows(&post, &columns, &column, &size)?;
+        supernodes.set_runs(&owner)?;
         let group_column: Vec<u32> = place.iter().map(|&at| column[at as usize]).collect();
-        own.set_pieces(matrix, &groups, &group_column, &owner);
-        Ok(own)
+        supernodes.set_pieces(matrix, &groups, &group_column, &owner);
+        Ok(supernodes)
     }
 
     /// The first column of a supernode, or the end of all.
@@ -379,9 +380,9 @@ impl Supernodes {
             }
             let mut middle = begin[end - 1];
             while middle > 0 {
-                let all = rest + work[middle].max(work[end] - work[middle]);
-                if all < least {
-                    (least, shares) = (all, [middle, end]);
+                let total = rest + work[middle].max(work[end] - work[middle]);
+                if total < least {
+                    (least, shares) = (total, [middle, end]);
                 }
                 middle = begin[middle - 1];
             }
@@ -430,10 +431,10 @@ impl Supernodes {
         let (mut used, mut left) = ([0; 2], Vec::new());
         for number in 0..self.nodes.len() {
             let node = self.nodes[number];
-            let (own, other) = (node.depth % 2, 1 - node.depth % 2);
+            let (stack, other) = (node.depth % 2, 1 - node.depth % 2);
             let size = padded(node.below()) * node.below();
-            used[own] += size;
-            self.stacks[own] = self.stacks[own].max(used[own]);
+            used[stack] += size;
+            self.stacks[stack] = self.stacks[stack].max(used[stack]);
             used[other] -= left.drain(left.len() - node.children..).sum::<usize>();
             left.push(size);
             let from = self.runs.len();
@@ -442,14 +443,15 @@ impl Supernodes {
                 let (edge, its) = (padded(parent.width), self.rows(&parent));
                 let (mut at, mut runs) = (0, Vec::<Run>::new());
                 for (row, from) in self.rows(&node).iter().zip(0..) {
-                    let to = match (*row as usize).checked_sub(parent.first).filter(|own| *own < parent.width)
-                    {
-                        Some(own) => own,
-                        None => {
-                            at += its[at..].iter().take_while(|other| *other != row).count();
-                            edge + at
-                        }
-                    };
+                    let to =
+                        match (*row as usize).checked_sub(parent.first).filter(|place| *place < parent.width)
+                        {
+                            Some(place) => place,
+                            None => {
+                                at += its[at..].iter().take_while(|other| *other != row).count();
+                                edge + at
+                            }
+                        };
                     match runs.last_mut() {
                         // Runs end at the border between the panel and the rows below.
                         Some(run) if (run.to + run.len) as usize == to && to != edge => run.len += 1,
@@ -466,8 +468,8 @@ impl Supernodes {
 
     /// Row of a column in the panel of a supernode.
     fn row_in(&self, node: &Supernode, column: u32) -> usize {
-        match (column as usize).checked_sub(node.first).filter(|own| *own < node.width) {
-            Some(own) => own,
+        match (column as usize).checked_sub(node.first).filter(|place| *place < node.width) {
+            Some(place) => place,
             None => padded(node.width) + self.rows(node).partition_point(|&row| row < column),
         }
     }

@@ -159,7 +159,7 @@ impl AtRigid {
                     let room = room + self.passage.stance().growth;
                     nearest.of(number as usize, &corners.map(|corner| corner.local), room, take);
                 }
-                FacePoints::Lattice(all) => self.look_at_lattice(rigid, room, all, &corners, take),
+                FacePoints::Lattice(lattice) => self.look_at_lattice(rigid, room, lattice, &corners, take),
             }
             if is_near {
                 self.near.extend(face);
@@ -174,7 +174,7 @@ impl AtRigid {
         &self,
         rigid: &Rigid,
         room: f64,
-        all: &[[f64; 3]],
+        lattice: &[[f64; 3]],
         corners: &[Seen; 3],
         mut found: impl FnMut([f64; 3]),
     ) {
@@ -189,7 +189,7 @@ impl AtRigid {
         if middle.distance > room + around {
             return;
         }
-        for &weights in all {
+        for &weights in lattice {
             let place = (0..3).map(|k| corners[k].local * weights[k]).sum::<Vector3<f64>>();
             let is_beyond = |seen: &Seen| {
                 let far = seen.distance - room;
@@ -259,7 +259,7 @@ mod tests {
                 jaw: None,
             };
             let fresh = || AtRigid::new(&rigid, 0, surface.clone(), |node| rest[node as usize]);
-            let (mut own, mut random) = (fresh(), Random::new(7));
+            let (mut kept, mut random) = (fresh(), Random::new(7));
             let (mut places, mut then) = (rest.clone(), rest.clone());
             let mut before = Pose::translation(0.1, 0.5, 0.1);
             let (mut listed, mut found) = (0, 0);
@@ -271,21 +271,22 @@ mod tests {
                 }
                 let turn = Vector3::new(0.2 * time.sin(), 0.0, 0.1 * time);
                 let after = Pose::new(Vector3::new(0.1 + 0.2 * time, 0.5, 0.08 + 0.05 * time.cos()), turn);
-                let rows = |own: &mut AtRigid| {
-                    own.passage = Passage::new(&rigid, [before, after].map(Stance::at));
+                let rows = |at_rigid: &mut AtRigid| {
+                    at_rigid.passage = Passage::new(&rigid, [before, after].map(Stance::at));
                     let ways = places.iter().zip(&then).map(|(now, then)| (now - then).norm());
-                    if !own.holds(&rigid, 1e-3, ways.fold(0.0, f64::max)) {
-                        own.list(&rigid, 1e-3, &places);
+                    if !at_rigid.holds(&rigid, 1e-3, ways.fold(0.0, f64::max)) {
+                        at_rigid.list(&rigid, 1e-3, &places);
                     }
                     let mut rows = Vec::new();
                     let mut seen = vec![Seen::default(); rest.len()];
-                    own.look(&rigid, 1e-3, &places, &mut seen, |row| rows.push((row.nodes, row.weights)));
+                    at_rigid
+                        .look(&rigid, 1e-3, &places, &mut seen, |row| rows.push((row.nodes, row.weights)));
                     rows
                 };
                 let anew = rows(&mut fresh());
-                let (stance, reach) = (own.listed.stance, own.listed.reach);
-                assert_eq!(rows(&mut own), anew, "{:?} at {time} s", rigid.shape);
-                if (own.listed.stance, own.listed.reach) != (stance, reach) {
+                let (stance, reach) = (kept.listed.stance, kept.listed.reach);
+                assert_eq!(rows(&mut kept), anew, "{:?} at {time} s", rigid.shape);
+                if (kept.listed.stance, kept.listed.reach) != (stance, reach) {
                     listed += 1;
                     then.clone_from(&places);
                 }

@@ -60,8 +60,8 @@ impl CoupledSurfaces {
     }
 
     pub fn press(&mut self, coupled: usize, impulse: Vector3<f64>) {
-        let own = &mut self.impulses[coupled];
-        *own = add(*own, impulse.into());
+        let sum = &mut self.impulses[coupled];
+        *sum = add(*sum, impulse.into());
     }
 
     fn at(&self, coupled: usize, time_fraction: f64) -> Vector3<f64> {

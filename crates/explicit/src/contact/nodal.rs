@@ -42,9 +42,13 @@ impl<R: LaneNumber> ContactSolver<R> {
         let is_own = |node: u32| self.coupled_surfaces.place_of(node).is_none();
         parts
             .filter(|(((node, _), _), _)| is_own(**node))
-            .map(|(((&node, own), pressure), gap)| NodeContact {
+            .map(|(((&node, tracked), pressure), gap)| NodeContact {
                 node,
-                force: if own.near { over(&(own.then - own.free), &own.own).into() } else { [0.0; 3] },
+                force: if tracked.near {
+                    over(&(tracked.then - tracked.free), &tracked.free_mobility).into()
+                } else {
+                    [0.0; 3]
+                },
                 pressure,
                 gap: Some(gap).filter(|gap| gap.is_finite()),
                 slip: way_of(&state.slip, node),
@@ -55,43 +59,43 @@ impl<R: LaneNumber> ContactSolver<R> {
     /// Sums of the impulses [N] on each node along the normals of its contacts.
     fn normal_forces(&self) -> Vec<Vector3<f64>> {
         let lifted = self.nodes.iter().map(|node| if node.near { node.lifted } else { Vector3::zeros() });
-        let mut all: Vec<Vector3<f64>> = lifted.collect();
+        let mut forces: Vec<Vector3<f64>> = lifted.collect();
         for row in &self.rows {
             for (node, weight) in row.parts() {
-                all[node] += row.normal * (row.push * weight);
+                forces[node] += row.normal * (row.push * weight);
             }
         }
         // Jaws that hold a node press on it along their normal.
-        for own in &self.own {
-            let Own::Rigid(own) = own else { continue };
-            if !own.grips {
+        for partner in &self.partners {
+            let Own::Rigid(at_rigid) = partner else { continue };
+            if !at_rigid.grips {
                 continue;
             }
-            let rigid = &self.contacts.rigids[own.rigid];
-            for &number in &own.surface.nodes {
+            let rigid = &self.contacts.rigids[at_rigid.rigid];
+            for &number in &at_rigid.surface.nodes {
                 let node = &self.nodes[number as usize];
-                if node.near && node.mobility != node.own {
-                    let Near { normal, .. } = own.passage.near(rigid, &node.then);
-                    let held = over(&(node.then - node.free), &node.own) - node.borne;
-                    all[number as usize] += normal * normal.dot(&held).max(0.0);
+                if node.near && node.mobility != node.free_mobility {
+                    let Near { normal, .. } = at_rigid.passage.near(rigid, &node.then);
+                    let held = over(&(node.then - node.free), &node.free_mobility) - node.borne;
+                    forces[number as usize] += normal * normal.dot(&held).max(0.0);
                 }
             }
         }
-        all
+        forces
     }
 
     /// Least gaps [m]; infinite where nothing is near.
     fn gaps(&self, places: &[Vector3<f64>]) -> Vec<f64> {
         let mut gaps = vec![f64::INFINITY; self.nodes.len()];
-        for (contact, own) in self.contacts.contacts.iter().zip(&self.own) {
+        for (contact, partner) in self.contacts.contacts.iter().zip(&self.partners) {
             let offset = contact.touch.offset;
-            match own {
-                Own::Rigid(own) => {
-                    let rigid = &self.contacts.rigids[own.rigid];
-                    for &node in &own.surface.nodes {
+            match partner {
+                Own::Rigid(at_rigid) => {
+                    let rigid = &self.contacts.rigids[at_rigid.rigid];
+                    for &node in &at_rigid.surface.nodes {
                         let now = &places[node as usize];
                         let gap = &mut gaps[node as usize];
-                        *gap = gap.min(own.passage.distance_before(rigid, now) - offset);
+                        *gap = gap.min(at_rigid.passage.distance_before(rigid, now) - offset);
                     }
                 }
                 Own::Bodies(pairs, _) => pairs.find(
@@ -140,12 +144,13 @@ impl<R: LaneNumber> ContactSolver<R> {
     /// The way [m] that a node slides in a step in which nothing bears on it; `None` if it leaves.
     fn hovering(&self, index: usize) -> Option<f64> {
         let node = Some(&self.nodes[index]).filter(|node| node.near)?;
-        let at_rigid = self.contacts.contacts.iter().zip(&self.own).find_map(|(contact, own)| {
-            let Own::Rigid(own) = own else { return None };
-            own.surface.nodes.binary_search(&(index as u32)).ok()?;
-            let Near { distance, normal } = own.passage.near(&self.contacts.rigids[own.rigid], &node.then);
-            let near = distance - contact.touch.offset < LASTS * own.margin;
-            near.then(|| across(&(node.then - own.passage.carry(&self.places[index])), &normal))
+        let at_rigid = self.contacts.contacts.iter().zip(&self.partners).find_map(|(contact, partner)| {
+            let Own::Rigid(at_rigid) = partner else { return None };
+            at_rigid.surface.nodes.binary_search(&(index as u32)).ok()?;
+            let Near { distance, normal } =
+                at_rigid.passage.near(&self.contacts.rigids[at_rigid.rigid], &node.then);
+            let near = distance - contact.touch.offset < LASTS * at_rigid.margin;
+            near.then(|| across(&(node.then - at_rigid.passage.carry(&self.places[index])), &normal))
         });
         // Its own part in a pair that bears nothing is not known.
         at_rigid.or(node.paired.then_some(0.0))

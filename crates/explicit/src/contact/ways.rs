@@ -59,7 +59,7 @@ impl<R: LaneNumber> LaneWork<R> for Largest<'_, R> {
             take_larger(&mut moved, now, then);
         }
         take_larger(&mut moved, rest_now, rest_then);
-        [way, moved].map(|all| all.iter().map(|x| x.to_f64()).fold(0.0, f64::max))
+        [way, moved].map(|lanes| lanes.iter().map(|x| x.to_f64()).fold(0.0, f64::max))
     }
 }
 
@@ -91,7 +91,7 @@ mod tests {
             for first in [0, count / 2] {
                 let [way, moved] = nodes.ways(first..count, &listed[first..]);
                 let length = |v: Vector<f32>| v.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>().sqrt();
-                let longest = |all: &mut dyn Iterator<Item = f64>| all.fold(0.0, f64::max);
+                let longest = |lengths: &mut dyn Iterator<Item = f64>| lengths.fold(0.0, f64::max);
                 let goes = 0.5 * longest(&mut increment[first..].iter().map(|&v| length(v)));
                 let between = |k: usize| [0, 1, 2].map(|c| displacement[k][c] - listed[k][c]);
                 let went = longest(&mut (first..count).map(|k| length(between(k))));

@@ -161,8 +161,8 @@ impl<R: RelaxedIn> Observable<R> for DynamicRelaxation<R> {
 
     fn reaction(&self, constraint: usize) -> Vector<f64> {
         match &self.model.constraints[constraint] {
-            own if own.motion.is_collective() => {
-                own.mean_force(|node| self.residual[node as usize].map(R::to_f64))
+            collective if collective.motion.is_collective() => {
+                collective.mean_force(|node| self.residual[node as usize].map(R::to_f64))
             }
             _ => sum_owned(&self.model, &self.owners, constraint, &self.residual),
         }
@@ -198,7 +198,7 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
             mass: fictitious_masses(&model).into_iter().map(R::of).collect(),
             slowness: 1.0,
             applied: AppliedForces::new(Arc::clone(&model)),
-            collectives: Collective::all(&model),
+            collectives: Collective::of_model(&model),
             bound: vec![[R::ZERO; 3]; if model.collective().is_some() { nodes } else { 0 }],
             trial_history: vec![History::default(); model.solids.len()],
             increment: vec![[R::ZERO; 3]; nodes],
@@ -346,7 +346,7 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
         let start = self.start(state, path.instant(from));
         self.increment.fill([R::ZERO; 3]);
         self.bound.fill([R::ZERO; 3]);
-        self.collectives.iter_mut().for_each(|own| own.enclosed.pressure = 0.0);
+        self.collectives.iter_mut().for_each(|collective| collective.enclosed.pressure = 0.0);
         let (single, tolerance) = (is_single::<R>(), self.settings.tolerance);
         let mut search = Search::default();
         for iteration in 0..self.settings.iterations {
@@ -487,8 +487,8 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
         }
         self.folded = found.folded;
         self.applied.update(time, &state.displacement);
-        for own in &mut self.collectives {
-            own.renew(&self.model, &state.displacement, &mut self.bound);
+        for collective in &mut self.collectives {
+            collective.renew(&self.model, &state.displacement, &mut self.bound);
         }
         std::mem::swap(&mut self.residual, &mut self.residual_before);
         let (residual, before) = (&mut self.residual, &self.residual_before);
@@ -563,7 +563,7 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
     /// reach without more such forces.
     fn bind(&mut self, state: &State<R>, [alpha, beta]: [R; 2], Instant { time, part }: Instant) {
         let Self { model, collectives, bound, residual, increment, mass, owners, .. } = self;
-        for own in collectives {
+        for collective in collectives {
             let predicted = |node: u32| {
                 let (at, mobility) = (node as usize, alpha / mass[node as usize]);
                 let now = state.displacement[at];
@@ -579,9 +579,9 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
                     held,
                 }
             };
-            let [factor, _] = model.constraints[own.constraint].motion.factors(time);
-            own.find(model, predicted, part * factor);
-            for (node, force) in own.forces(model) {
+            let [factor, _] = model.constraints[collective.constraint].motion.factors(time);
+            collective.find(model, predicted, part * factor);
+            for (node, force) in collective.forces(model) {
                 for c in 0..3 {
                     bound[node as usize][c] += R::of(force[c]);
                     residual[node as usize][c] -= R::of(force[c]);
@@ -723,14 +723,14 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
             let (internal, applied) = (forces.at(node), scale(self.applied.at(node), R::of(part)));
             [0, 1, 2].map(|c| if self.owners[node][c] == FREE { applied[c] } else { internal[c] })
         };
-        let mut all: Vec<Vector<R>> = (0..self.model.node_count()).map(outside).collect();
+        let mut external: Vec<Vector<R>> = (0..self.model.node_count()).map(outside).collect();
         let resisting = |node: usize| sub(forces.at(node), scale(self.applied.at(node), R::of(part)));
         for (node, force) in self.borne(state, resisting) {
-            all[node as usize] = add(all[node as usize], force);
+            external[node as usize] = add(external[node as usize], force);
         }
         Start {
             displacement: state.displacement.clone(),
-            outside: all,
+            outside: external,
             missing,
             stored: Recovery::new(&self.model, state).stored_energy() + hourglass,
         }

@@ -57,12 +57,13 @@ impl<R: LaneNumber> Way<R> {
             let difference: f64 = (self.last.iter().zip(&next))
                 .map(|([u, f], [v, g])| 0.5 * (product(u, g) - product(v, f)))
                 .sum();
-            let of = |own: f64, other: f64| difference * own * own / (3.0 * other * (own + other));
+            let of =
+                |length: f64, other: f64| difference * length * length / (3.0 * other * (length + other));
             // A short way says little about a long one.
-            let own = of(b, a.max(SHORTEST * b));
+            let latest = of(b, a.max(SHORTEST * b));
             self.error = match self.error {
-                None if self.equilibria == 1 && b >= SHORTEST * a => Some(own + of(a, b)),
-                before => before.map(|before| before + own),
+                None if self.equilibria == 1 && b >= SHORTEST * a => Some(latest + of(a, b)),
+                before => before.map(|before| before + latest),
             };
         }
         self.equilibria += 1;

@@ -92,10 +92,10 @@ impl<R: LaneNumber> AveragedTets<R> {
     fn average_to_nodes(&mut self, sums: &[Quad<R>]) {
         let AveragedConstants { shares, inverse_volume, .. } = &self.constants;
         self.node_value.par_iter_mut().enumerate().with_min_len(32).for_each(|(pack, nodes)| {
-            let own = pack * PACK..inverse_volume.len().min((pack + 1) * PACK);
+            let numbers = pack * PACK..inverse_volume.len().min((pack + 1) * PACK);
             let part = |place: usize| sums[place][0];
-            shares.visit(own.clone(), &mut nodes.0, part, |sum, place| *sum += part(place));
-            for (value, &inverse) in nodes.0.iter_mut().zip(&inverse_volume[own]) {
+            shares.visit(numbers.clone(), &mut nodes.0, part, |sum, place| *sum += part(place));
+            for (value, &inverse) in nodes.0.iter_mut().zip(&inverse_volume[numbers]) {
                 *value = *value * inverse;
             }
         });
@@ -188,9 +188,9 @@ impl<R: LaneNumber> LaneWork<R> for CellPressures<'_, R> {
                     average::<R, L>(&local, pack, at).store(value, at);
                 }
             }
-            let own = (first - packs.start) * slots;
-            let own = own.min(history.len())..(own + values.len() * slots).min(history.len());
-            relaxed_pressures::<R, L>(law, relaxation, *slots, values, &mut history[own], &mut batch);
+            let start = (first - packs.start) * slots;
+            let range = start.min(history.len())..(start + values.len() * slots).min(history.len());
+            relaxed_pressures::<R, L>(law, relaxation, *slots, values, &mut history[range], &mut batch);
             for ((value, pack), rest) in values.iter_mut().zip(first - packs.start..).zip(&rest[first..]) {
                 for at in (0..PACK).step_by(L::WIDTH) {
                     (L::load(value, at) * L::of(0.25) * L::load(&rest.volume, at)).store(value, at);
@@ -292,8 +292,8 @@ impl<R: LaneNumber> LaneWork<R> for AveragedPass<'_, R> {
                     batch.note(index, (first + index) * PACK, &mut findings);
                     for at in (0..PACK).step_by(L::WIDTH) {
                         let h: Tensor<L> = load_tensor(&batch.gradient[index], at);
-                        let own = L::load(&batch.volume_ratio[index], at);
-                        batch.set(index, at, &dilated(&h, own, L::load(average, at)));
+                        let ratio = L::load(&batch.volume_ratio[index], at);
+                        batch.set(index, at, &dilated(&h, ratio, L::load(average, at)));
                     }
                 }
             }
@@ -303,7 +303,7 @@ impl<R: LaneNumber> LaneWork<R> for AveragedPass<'_, R> {
                 if !of_deformation {
                     batch.note(index, pack * PACK, &mut findings);
                 }
-                let own = own_packs(pack - packs.start, per_pack, history.len());
+                let range = own_packs(pack - packs.start, per_pack, history.len());
                 for at in (0..PACK).step_by(L::WIDTH) {
                     let elastic = match wanted {
                         Wanted::Parts => batch.parts::<L>(index, at),
@@ -311,7 +311,7 @@ impl<R: LaneNumber> LaneWork<R> for AveragedPass<'_, R> {
                     };
                     let f = batch.deformation_gradient::<L>(index, at);
                     let average = L::load(average, at);
-                    let piola = constants.piola(&f, elastic, average, &mut history[own.clone()], at);
+                    let piola = constants.piola(&f, elastic, average, &mut history[range.clone()], at);
                     let piola = piola.scaled(L::load(&rest[pack].volume, at));
                     by_cell(&nodal_forces(&piola, &rest[pack].gradient, at), &mut forces, at);
                 }

@@ -87,7 +87,7 @@ impl<R: LaneNumber> Element<R> for BarConstants<R> {
         let packs = cells.packs_of(block);
         let mut local = cells.places.at_work(block, moved, sums);
         for pack in packs.clone() {
-            let own = own_packs(pack - packs.start, *per_pack, history.len());
+            let range = own_packs(pack - packs.start, *per_pack, history.len());
             let bar = &rest[pack];
             for at in (0..PACK).step_by(L::WIDTH) {
                 let ([moved], _) = relative::<R, L, 2, 1>(&local, pack - packs.start, at);
@@ -103,7 +103,7 @@ impl<R: LaneNumber> Element<R> for BarConstants<R> {
                 let o = L::ZERO;
                 let elastic =
                     Split { isochoric: Symmetric([stress, o, o, o, o, o]), volumetric: Symmetric([o; 6]) };
-                let [mut stress, ..] = relaxation.advance(elastic, &mut history[own.clone()], at).0;
+                let [mut stress, ..] = relaxation.advance(elastic, &mut history[range.clone()], at).0;
                 if *tension_only {
                     stress = stress.max(L::ZERO);
                 }

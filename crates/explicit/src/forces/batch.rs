@@ -165,12 +165,12 @@ impl<R: LaneNumber, T: Law> LaneWork<R> for Stresses<'_, R, T> {
         let Self { law, wanted, batch, packs, points, fibres } = self;
         let families = law.families();
         for pack in 0..packs {
-            let own = &fibres[pack / points * families..][..families];
+            let pack_fibres = &fibres[pack / points * families..][..families];
             for at in (0..PACK).step_by(L::WIDTH) {
                 let h = load_tensor(&batch.gradient[pack], at);
                 let deformation = Deformation::<L>::from_displacement_gradient(&h);
                 let mut directions = [[L::ZERO; 3]; MOST_FAMILIES];
-                for (direction, fibre) in directions.iter_mut().zip(own) {
+                for (direction, fibre) in directions.iter_mut().zip(pack_fibres) {
                     *direction = load_vector(fibre, at);
                 }
                 let directions = &directions[..families];

@@ -69,18 +69,18 @@ impl Blocks {
         let mut numbers = vec![u16::MAX; (high + 1).saturating_sub(low) as usize];
         for cells in cells.chunks(packs * PACK) {
             let first = blocks.nodes.len();
-            let mut own = Vec::new();
+            let mut members = Vec::new();
             for &node in cells.as_flattened() {
                 if std::mem::replace(&mut numbers[(node - low) as usize], 0) == u16::MAX {
-                    own.push(node);
+                    members.push(node);
                 }
             }
-            own.sort_unstable();
-            own.iter().zip(0..).for_each(|(&node, number)| numbers[(node - low) as usize] = number);
+            members.sort_unstable();
+            members.iter().zip(0..).for_each(|(&node, number)| numbers[(node - low) as usize] = number);
             local.extend(cells.iter().map(|cell| cell.map(|node| numbers[(node - low) as usize])));
-            own.iter().for_each(|&node| numbers[(node - low) as usize] = u16::MAX);
-            blocks.stride = blocks.stride.max(own.len());
-            blocks.nodes.extend(own);
+            members.iter().for_each(|&node| numbers[(node - low) as usize] = u16::MAX);
+            blocks.stride = blocks.stride.max(members.len());
+            blocks.nodes.extend(members);
             blocks.offsets.push(blocks.nodes.len() as u32);
             debug_assert!(blocks.nodes.len() - first <= usize::from(u16::MAX));
         }
@@ -232,7 +232,7 @@ impl<R: LaneNumber> Moved<R> {
     ) {
         let Self { blocks, vectors } = self;
         let (count, stride) = (blocks.len(), blocks.stride.max(1));
-        let of_blocks = |(all, per_pack)| in_blocks(all, per_pack * blocks.packs, count);
+        let of_blocks = |(values, per_pack)| in_blocks(values, per_pack * blocks.packs, count);
         let history = of_blocks(history).zip(of_blocks(pressures));
         let rows = vectors.par_chunks_mut(stride).zip(forces.par_chunks_mut(stride));
         rows.zip(history).zip(findings).enumerate().for_each(

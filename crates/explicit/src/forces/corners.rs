@@ -111,9 +111,9 @@ impl<R: LaneNumber, const N: usize, const M: usize> LaneWork<R> for CornerCheck<
         let mut depths = Pack::ZERO;
         for at in (0..PACK).step_by(L::WIDTH) {
             let (u, _) = relative::<R, L, N, M>(self.local, self.pack, at);
-            let mut all = [[L::ZERO; 3]; 7];
-            all.iter_mut().zip(u).for_each(|(to, u)| *to = u);
-            self.corners.depth(&all, at).store(&mut depths, at);
+            let mut displacements = [[L::ZERO; 3]; 7];
+            displacements.iter_mut().zip(u).for_each(|(to, u)| *to = u);
+            self.corners.depth(&displacements, at).store(&mut depths, at);
         }
         first_folded(&depths, self.flatness)
     }

@@ -73,8 +73,8 @@ impl<R: LaneNumber> Point<R> {
     fn add_forces<L: Lanes<R>>(&self, piola: &Tensor<L>, nodal: &mut [Vector<Pack<R>>; 7], at: usize) {
         let piola = piola.scaled(L::load(&self.weight, at));
         for (force, b) in nodal.iter_mut().zip(&self.gradient) {
-            let own = piola.apply(load_vector(b, at));
-            store_vector(add(load_vector(force, at), own), force, at);
+            let contribution = piola.apply(load_vector(b, at));
+            store_vector(add(load_vector(force, at), contribution), force, at);
         }
     }
 }
@@ -82,11 +82,11 @@ impl<R: LaneNumber> Point<R> {
 /// Vectors of all nodes but the first, in the lanes from `at` on.
 #[inline(always)]
 fn load_all<R: LaneNumber, L: Lanes<R>>(packed: &[Vector<Pack<R>>; 7], at: usize) -> [Vector<L>; 7] {
-    let mut all = [[L::ZERO; 3]; 7];
-    for (to, from) in all.iter_mut().zip(packed) {
+    let mut loaded = [[L::ZERO; 3]; 7];
+    for (to, from) in loaded.iter_mut().zip(packed) {
         *to = load_vector(from, at);
     }
-    all
+    loaded
 }
 
 impl<R: LaneNumber> FullHexConstants<R> {
@@ -164,9 +164,9 @@ impl<R: LaneNumber> Element<R> for FullHexConstants<R> {
             }
             // U'(v/V), relaxed where the law's volumetric part relaxes.
             let slots = self.volumetric_slots;
-            let own = own_packs(pack_of_block, slots, pressures.len());
+            let range = own_packs(pack_of_block, slots, pressures.len());
             let values = std::slice::from_mut(&mut pressure);
-            relaxed_pressures::<R, L>(law, relaxation, slots, values, &mut pressures[own], &mut batch);
+            relaxed_pressures::<R, L>(law, relaxation, slots, values, &mut pressures[range], &mut batch);
             nodal.fill([Pack::ZERO; 3]);
             for (part, points) in points[pack].chunks(PACKS).enumerate() {
                 for (index, point) in points.iter().enumerate() {
@@ -179,10 +179,10 @@ impl<R: LaneNumber> Element<R> for FullHexConstants<R> {
                 for (index, point) in points.iter().enumerate() {
                     batch.note(index, pack * PACK, &mut findings);
                     let number = pack_of_block * 8 + part * PACKS + index;
-                    let own = own_packs(number, per_point, history.len());
+                    let range = own_packs(number, per_point, history.len());
                     for at in (0..PACK).step_by(L::WIDTH) {
                         let isochoric = batch.stress::<L>(index, at);
-                        let stress = relaxation.advance_isochoric(isochoric, &mut history[own.clone()], at);
+                        let stress = relaxation.advance_isochoric(isochoric, &mut history[range.clone()], at);
                         let f = batch.deformation_gradient::<L>(index, at);
                         let piola = f.times_symmetric(&stress);
                         let piola = piola.plus_scaled(&f.cofactor(), L::load(&pressure, at));

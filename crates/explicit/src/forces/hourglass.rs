@@ -131,8 +131,8 @@ impl<R: LaneNumber> Growth<R> {
     ) {
         if let Some(stress) = &self.stress {
             let gradient: Tensor<L> = batch.deformation_gradient(index, at);
-            let own = gradient.times_symmetric(&load_symmetric(&stress[index], at));
-            *piola = piola.plus_scaled(&own, L::ONE);
+            let added = gradient.times_symmetric(&load_symmetric(&stress[index], at));
+            *piola = piola.plus_scaled(&added, L::ONE);
         }
     }
 }
@@ -164,10 +164,10 @@ impl<R: LaneNumber> LaneWork<R> for FindGrowth<'_, R> {
             let constant = &growth.constant[index];
             let mut factors = Pack::ZERO;
             for at in (0..PACK).step_by(L::WIDTH) {
-                let (_, own) = grown::<R, L>(batch, wanted, shear, index, at);
-                own.factor.store(&mut factors, at);
-                resistance.grow(own.factor, at);
-                let held = L::load(constant, at) * own.factor;
+                let (_, shear_growth) = grown::<R, L>(batch, wanted, shear, index, at);
+                shear_growth.factor.store(&mut factors, at);
+                resistance.grow(shear_growth.factor, at);
+                let held = L::load(constant, at) * shear_growth.factor;
                 (held + L::load(energy, at)).store(energy, at);
             }
             for lane in 0..PACK {
@@ -184,8 +184,9 @@ impl<R: LaneNumber> LaneWork<R> for FindGrowth<'_, R> {
         let (mut ahead, mut behind) = (Batch::new(), Batch::new());
         for index in 0..packs {
             for at in (0..PACK).step_by(L::WIDTH) {
-                let (deformation, own) = grown::<R, L>(batch, wanted, shear, index, at);
-                let (h, way) = (load_tensor(&batch.gradient[index], at), own.direction(&deformation));
+                let (deformation, shear_growth) = grown::<R, L>(batch, wanted, shear, index, at);
+                let (h, way) =
+                    (load_tensor(&batch.gradient[index], at), shear_growth.direction(&deformation));
                 ahead.set(index, at, &h.plus_scaled(&way, difference));
                 behind.set(index, at, &h.plus_scaled(&way, -difference));
             }
@@ -195,11 +196,14 @@ impl<R: LaneNumber> LaneWork<R> for FindGrowth<'_, R> {
         let added = growth.stress.insert([Symmetric([Pack::ZERO; 6]); PACKS]);
         for (index, added) in added[..packs].iter_mut().enumerate() {
             for at in (0..PACK).step_by(L::WIDTH) {
-                let (deformation, own) = grown::<R, L>(batch, wanted, shear, index, at);
+                let (deformation, shear_growth) = grown::<R, L>(batch, wanted, shear, index, at);
                 let (after, before) = (ahead.stress::<L>(index, at), behind.stress::<L>(index, at));
                 let (half, rate) = (L::of(0.5), L::of(0.5) / difference);
-                let gradient =
-                    own.gradient(&deformation, &((after + before) * half), &((after - before) * rate));
+                let gradient = shear_growth.gradient(
+                    &deformation,
+                    &((after + before) * half),
+                    &((after - before) * rate),
+                );
                 store_symmetric(gradient * L::load(&growth.constant[index], at), added, at);
             }
         }

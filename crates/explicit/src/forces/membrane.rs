@@ -326,7 +326,7 @@ impl<R: LaneNumber> Element<R> for MembraneConstants<R> {
             if let Some(shear) = self.neo_hookean {
                 for index in 0..count {
                     let pack = first + index;
-                    let own = own_packs(pack - packs.start, *per_pack, history.len());
+                    let range = own_packs(pack - packs.start, *per_pack, history.len());
                     for at in (0..PACK).step_by(L::WIDTH) {
                         let (u, _) = relative::<R, L, 3, 2>(&local, pack - packs.start, at);
                         let changes = rest[pack].changes(&u, at);
@@ -334,7 +334,7 @@ impl<R: LaneNumber> Element<R> for MembraneConstants<R> {
                         let found = NeoHookeanWall::new(strain, L::splat(shear));
                         found.area.store(&mut batch.volume_ratio[index], at);
                         found.strain.store(&mut batch.strain[index], at);
-                        let stress = relaxed(relaxation, found.stress, &mut history[own.clone()], at);
+                        let stress = relaxed(relaxation, found.stress, &mut history[range.clone()], at);
                         by_cell(&rest[pack].forces(stress, &changes, at), &mut forces, at);
                     }
                     note(&mut batch, index, pack, &mut findings);
@@ -360,10 +360,10 @@ impl<R: LaneNumber> Element<R> for MembraneConstants<R> {
                     area.store(&mut batch.volume_ratio[index], at);
                 }
                 note(&mut batch, index, pack, &mut findings);
-                let own = own_packs(pack - packs.start, *per_pack, history.len());
+                let range = own_packs(pack - packs.start, *per_pack, history.len());
                 for at in (0..PACK).step_by(L::WIDTH) {
                     let stress = walls.stress::<L>(self, &batch, index, at);
-                    let stress = relaxed(relaxation, stress, &mut history[own.clone()], at);
+                    let stress = relaxed(relaxation, stress, &mut history[range.clone()], at);
                     // Tangents now, from displacements that are still in the first cache.
                     let (u, _) = relative::<R, L, 3, 2>(&local, pack - packs.start, at);
                     let nodal = rest[pack].forces(stress, &rest[pack].changes(&u, at), at);

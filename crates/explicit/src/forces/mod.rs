@@ -75,12 +75,13 @@ fn side_by_side<R: LaneNumber>(
     forces: &mut [Quad<R>],
     findings: &mut [Vec<Findings<R>>],
 ) {
-    let ([field, fields @ ..], [own, history @ ..], [found, findings @ ..]) = (fields, history, findings)
+    let ([field, fields @ ..], [field_history, history @ ..], [found, findings @ ..]) =
+        (fields, history, findings)
     else {
         return;
     };
     let (first, forces) = forces.split_at_mut(offsets[1] - offsets[0]);
-    let mut evaluate = || field.evaluate(displacement, own, first, found);
+    let mut evaluate = || field.evaluate(displacement, field_history, first, found);
     if fields.is_empty() {
         return evaluate();
     }
@@ -130,10 +131,10 @@ impl<R: LaneNumber> Tied<R> {
             offsets.push(given.len() as u32);
         }
         let count = offsets.len() - 1;
-        let own = places.iter().map(|&(node, place)| (number[node as usize], place));
-        let own = own.filter(|(number, _)| *number != u32::MAX);
+        let tied_places = places.iter().map(|&(node, place)| (number[node as usize], place));
+        let tied_places = tied_places.filter(|(number, _)| *number != u32::MAX);
         let tied = Self {
-            shares: Shares::new(count, none, own),
+            shares: Shares::new(count, none, tied_places),
             forces: vec![[R::ZERO; 3]; count],
             offsets,
             given,
@@ -178,8 +179,8 @@ impl<R: LaneNumber> InternalForces<R> {
             let follows = model.followers();
             let places: Vec<(u32, u32)> = places.collect();
             let (tied, taken) = Tied::new(model, &places, count, none);
-            let own = places.into_iter().filter(|(node, _)| !follows[*node as usize]).chain(taken);
-            (Some(tied), Shares::new(model.node_count(), none, own))
+            let kept = places.into_iter().filter(|(node, _)| !follows[*node as usize]).chain(taken);
+            (Some(tied), Shares::new(model.node_count(), none, kept))
         };
         Self {
             shares,

@@ -11,11 +11,11 @@ use super::blocks::{Blocks, MOST_PACKS, Quad};
 use crate::lanes::LaneNumber;
 use crate::lanes::{Lanes, Local, PACK, Pack, Places, load_vector};
 
-/// Range of the history of one of several points, `each` packs a point, in a history of `all` packs; empty in
-/// an empty one.
+/// Range of the history of one of several points, `each` packs a point, in a history of `total` packs; empty
+/// in an empty one.
 #[inline(always)]
-pub(super) fn own_packs(point: usize, each: usize, all: usize) -> Range<usize> {
-    (point * each).min(all)..((point + 1) * each).min(all)
+pub(super) fn own_packs(point: usize, each: usize, total: usize) -> Range<usize> {
+    (point * each).min(total)..((point + 1) * each).min(total)
 }
 
 /// Constants of packs of cells that all elements need.

@@ -203,8 +203,8 @@ impl<R: LaneNumber, const N: usize, const M: usize> Element<R> for PlainConstant
                 if findings.folded.is_none() {
                     findings.folded = self.folded::<L>(&local, pack, index, &work);
                 }
-                let own = own_packs(pack[1], *per_pack, history.len());
-                self.forces::<L>(pack[0], index, &work, &mut history[own], &mut forces);
+                let range = own_packs(pack[1], *per_pack, history.len());
+                self.forces::<L>(pack[0], index, &work, &mut history[range], &mut forces);
                 local.add::<L>(pack[1], &forces);
             }
         }

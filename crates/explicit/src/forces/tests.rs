@@ -171,9 +171,9 @@ impl MovedSolid<'_> {
             (0..block.nodes.len()).map(|cell| self.gradient(cell, &block.rest[cell].gradient)).collect();
         let shape: f64 = h.iter().enumerate().map(|(cell, h)| volume(cell) * self.split(h).isochoric).sum();
         let nodal = |node: usize| {
-            let own: f64 = local.cells_at(node).map(volume).sum();
+            let total: f64 = local.cells_at(node).map(volume).sum();
             let changes = local.cells_at(node).map(|cell| volume(cell) * volume_change(&h[cell]));
-            (own, changes.sum::<f64>() / own)
+            (total, changes.sum::<f64>() / total)
         };
         let averaged: Vec<(f64, f64)> = (0..local.len()).map(nodal).collect();
         let of_cell = |cell: usize| {
@@ -427,9 +427,9 @@ fn a_growing_hourglass_stiffness_conserves_energy() {
         stepper.evaluate(&mut state).unwrap();
         let energies = stepper.energies();
         let stored = Recovery::new(&model, &state).stored_energy() + energies.hourglass;
-        let all = energies.kinetic + stored;
-        (least, most) = (least.min(all), most.max(all));
-        hourglass = hourglass.max(energies.hourglass / all);
+        let total = energies.kinetic + stored;
+        (least, most) = (least.min(total), most.max(total));
+        hourglass = hourglass.max(energies.hourglass / total);
         stepper.advance(&mut state);
     }
     assert!(hourglass > 0.1, "{hourglass}");
@@ -453,10 +453,10 @@ fn energy_densities_sum_to_the_energy_that_the_forces_come_from() {
         if matches!(solid.cells, Cells::Bar(..)) {
             continue;
         }
-        let own: Vec<_> = (0..solid.cells.len()).map(|cell| recovery.cell(0, cell)).collect();
+        let recovered: Vec<_> = (0..solid.cells.len()).map(|cell| recovery.cell(0, cell)).collect();
         // Averages and cells change the same volume in all.
         let volume = |of: fn(&CellFields) -> f64| -> f64 {
-            own.iter().enumerate().map(|(cell, fields)| solid.cells.volume(cell) * of(fields)).sum()
+            recovered.iter().enumerate().map(|(cell, fields)| solid.cells.volume(cell) * of(fields)).sum()
         };
         let [averaged, cells] = [volume(|f| f.volume_ratio), volume(|f| f.cell_volume_ratio)];
         assert!((averaged / cells - 1.0).abs() < 1e-12, "{name}: {averaged:e} m³ for {cells:e} m³");
@@ -480,13 +480,14 @@ fn cells_in_lanes_are_recovered_as_one_by_one() {
         let numbers = |fields: &CellFields| {
             let tensors = [fields.green_strain, fields.pk2_stress, fields.cauchy_stress];
             let other = [fields.volume_ratio, fields.cell_volume_ratio, fields.energy_density];
-            let all = fields.gradient.0.into_iter().flatten().chain(tensors.into_iter().flat_map(|s| s.0));
-            all.chain(other).chain(fields.fibre_stretch).collect::<Vec<f64>>()
+            let components =
+                fields.gradient.0.into_iter().flatten().chain(tensors.into_iter().flat_map(|s| s.0));
+            components.chain(other).chain(fields.fibre_stretch).collect::<Vec<f64>>()
         };
         let width = numbers(&recovery.cell(0, 0)).len();
-        let all = recovery.numbers(0, width, |_, fields, to| to.copy_from_slice(&numbers(fields)));
-        assert_eq!(all.len(), width * solid.cells.len());
-        for (cell, found) in all.chunks(width).enumerate() {
+        let recovered = recovery.numbers(0, width, |_, fields, to| to.copy_from_slice(&numbers(fields)));
+        assert_eq!(recovered.len(), width * solid.cells.len());
+        for (cell, found) in recovered.chunks(width).enumerate() {
             let fields = &recovery.cell(0, cell);
             let bits = |numbers: &[f64]| numbers.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
             assert_eq!(bits(found), bits(&numbers(fields)), "{name} {cell}");

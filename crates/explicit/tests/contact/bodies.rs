@@ -40,15 +40,15 @@ fn between(model: &Model, friction: f64, offset: f64) -> Arc<Contacts> {
 
 /// Momentum [kg m/s] and its moment about the origin at a state, by the velocities between two instants.
 fn momenta(model: &Model, state: &State<f64>, step: f64) -> [Vector3<f64>; 2] {
-    let mut all = [Vector3::zeros(); 2];
+    let mut momenta = [Vector3::zeros(); 2];
     for node in 0..model.node_count() {
         let moved = Vector3::from(state.increment[node]) / step;
         // Increments lead to the place: forces act at the place before.
         let place = Vector3::from(model.rest[node]) + Vector3::from(state.displacement[node]);
-        all[0] += model.mass[node] * moved;
-        all[1] += model.mass[node] * place.cross(&moved);
+        momenta[0] += model.mass[node] * moved;
+        momenta[1] += model.mass[node] * place.cross(&moved);
     }
-    all
+    momenta
 }
 
 /// Takes one step. Returns the force [N] of the first contact on the second body, and the state's energy [J].

@@ -145,12 +145,12 @@ fn play(scene: &Scene, is_rigid: bool) -> Result<(), String> {
     );
     // Falls in the time are below 0.8 m; shear waves run at 7 m/s, and thin tips are thrown about.
     let fine = touched > 0 && crossed == 0 && deepest <= 0.0 && far < 1.0 && fastest < 20.0;
-    let told = || {
+    let report = || {
         format!(
             "{name}: {crossed} intersections, {deepest} m deep, {far} m, {fastest} m/s, {touched} touches"
         )
     };
-    if fine { Ok(()) } else { Err(told()) }
+    if fine { Ok(()) } else { Err(report()) }
 }
 
 /// Corners, edges and faces of free bodies that fly into each other (S2).

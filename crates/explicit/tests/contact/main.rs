@@ -62,16 +62,16 @@ pub fn add_block(model: &mut Model, cells: [u32; 3], size: [f64; 3], at: Isometr
 pub fn faces(solid: &Solid) -> Vec<[u32; 3]> {
     const SIDES: [[usize; 4]; 6] =
         [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
-    let mut all = std::collections::BTreeMap::new();
+    let mut by_nodes = std::collections::BTreeMap::new();
     for cell in 0..solid.cells.len() {
         let nodes = solid.cells.nodes(cell);
         for side in SIDES.map(|side| side.map(|k| nodes[k])) {
             let mut key = side;
             key.sort_unstable();
-            all.entry(key).or_insert_with(Vec::new).push(side);
+            by_nodes.entry(key).or_insert_with(Vec::new).push(side);
         }
     }
-    let outer = all.into_values().filter(|sides| sides.len() == 1).flatten();
+    let outer = by_nodes.into_values().filter(|sides| sides.len() == 1).flatten();
     outer.flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect()
 }
 

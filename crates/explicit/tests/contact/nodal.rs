@@ -20,13 +20,13 @@ fn place(model: &Model, state: &State<f64>, node: u32) -> Vector3<f64> {
 }
 
 /// The pressure [Pa]; zero inside of the body.
-fn pressure(own: &NodeContact) -> f64 {
-    own.pressure.unwrap_or(0.0)
+fn pressure(contact: &NodeContact) -> f64 {
+    contact.pressure.unwrap_or(0.0)
 }
 
 /// The sum of the forces on nodes [N].
 fn sum(nodes: &[NodeContact]) -> Vector3<f64> {
-    nodes.iter().map(|own| Vector3::from(own.force)).sum()
+    nodes.iter().map(|contact| Vector3::from(contact.force)).sum()
 }
 
 /// The third parts [m²] of the deformed faces around each node that look down, across the vertical.
@@ -68,14 +68,15 @@ fn forces_and_pressures_of_nodes_sum_to_the_force_of_the_contact() {
         let force = Vector3::from(stepper.contact_forces()[0]);
         let off = (sum(&nodes) + force).norm() / force.norm();
         let shares = shares(&contacts, &model, &state);
-        let pressed: f64 = nodes.iter().map(|own| pressure(own) * shares[own.node as usize]).sum();
+        let pressed: f64 =
+            nodes.iter().map(|contact| pressure(contact) * shares[contact.node as usize]).sum();
         println!(
             "t = {until}: {force:?} N, forces off by {off:.1e}, pressures by {:.1e}",
             pressed / -force.z - 1.0
         );
         assert!(force.z < -1e-3 && off < 1e-10, "{off:.1e}");
         assert!((pressed / -force.z - 1.0).abs() < 1e-10, "{pressed} N of {} N", -force.z);
-        assert!(nodes.iter().all(|own| pressure(own) >= 0.0));
+        assert!(nodes.iter().all(|contact| pressure(contact) >= 0.0));
     }
 }
 
@@ -87,17 +88,20 @@ fn a_block_presses_on_its_floor_by_its_height() {
     let expected = 1000.0 * 9.81 * 0.02;
     let (mut worst, mut corners) = (0.0_f64, Vec::new());
     let shares = shares(&contacts, &model, &state);
-    for own in stepper.contact_nodes(&state) {
-        let [x, y, z] = model.rest[own.node as usize];
-        let (gap, pressure) = (own.gap.unwrap(), pressure(&own));
+    for contact in stepper.contact_nodes(&state) {
+        let [x, y, z] = model.rest[contact.node as usize];
+        let (gap, pressure) = (contact.gap.unwrap(), pressure(&contact));
         if z > 0.0 {
-            assert!(pressure == 0.0 && own.force == [0.0; 3] && own.slip.is_none() && gap > 0.0, "{own:?}");
+            assert!(
+                pressure == 0.0 && contact.force == [0.0; 3] && contact.slip.is_none() && gap > 0.0,
+                "{contact:?}"
+            );
             continue;
         }
-        assert!(gap.abs() < 1e-12 && own.slip.is_some(), "{own:?}");
+        assert!(gap.abs() < 1e-12 && contact.slip.is_some(), "{contact:?}");
         let ratio = pressure / expected;
         match [x, y].iter().all(|&x| x == 0.0 || x > 0.0399) {
-            true => corners.push(ratio * shares[own.node as usize] / (0.25 * 1e-4)),
+            true => corners.push(ratio * shares[contact.node as usize] / (0.25 * 1e-4)),
             false => worst = worst.max((ratio - 1.0).abs()),
         }
     }
@@ -130,10 +134,10 @@ fn gaps_are_distances_from_tools() {
         let centre = Vector3::new(0.01 + 0.02 * state.time, 0.01, 0.031);
         let nodes = stepper.contact_nodes(&state);
         assert_eq!(nodes.len(), model.node_count());
-        for own in nodes {
-            let gap = (place(&model, &state, own.node) - centre).norm() - 0.01 - 5e-4;
-            assert!((own.gap.unwrap() - gap).abs() < 1e-15, "{own:?}: {gap}");
-            assert!(pressure(&own) == 0.0 && own.slip.is_none());
+        for contact in nodes {
+            let gap = (place(&model, &state, contact.node) - centre).norm() - 0.01 - 5e-4;
+            assert!((contact.gap.unwrap() - gap).abs() < 1e-15, "{contact:?}: {gap}");
+            assert!(pressure(&contact) == 0.0 && contact.slip.is_none());
         }
         stepper.advance(&mut state);
     }
@@ -168,18 +172,18 @@ fn slip_on_an_incline_is_the_way_that_nodes_go() {
             stepper.contact_nodes(state)
         };
         let mut worst = 0.0_f64;
-        for own in step(&mut stepper, &mut state, 1.4) {
-            if model.rest[own.node as usize][2] > 0.0 {
+        for contact in step(&mut stepper, &mut state, 1.4) {
+            if model.rest[contact.node as usize][2] > 0.0 {
                 continue;
             }
-            let [x, y, _] = state.displacement[own.node as usize];
-            let (slip, way) = (own.slip.unwrap(), x.hypot(y));
+            let [x, y, _] = state.displacement[contact.node as usize];
+            let (slip, way) = (contact.slip.unwrap(), x.hypot(y));
             assert!((least..most).contains(&slip), "{slip} m with friction {friction}");
             worst = worst.max((slip - way).abs() / way);
         }
         println!("friction {friction}: slips off by {worst:.1e} of the ways");
         assert!(worst < 0.01 || friction > 0.5, "{worst:.1e}");
         let later = step(&mut stepper, &mut state, 1.6);
-        assert!(later.iter().all(|own| own.slip.is_none() && own.force == [0.0; 3]), "{later:?}");
+        assert!(later.iter().all(|contact| contact.slip.is_none() && contact.force == [0.0; 3]), "{later:?}");
     }
 }

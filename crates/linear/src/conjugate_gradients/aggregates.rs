@@ -55,17 +55,17 @@ pub(super) fn aggregates(around: &[Vec<u32>], most: usize) -> (Vec<u32>, Vec<u32
 /// Groups of nodes. Loose parts of fewer than `size` nodes join until they have as many. `is_within` returns
 /// true if a node has neighbours only in the group with a number.
 fn joined(groups: Vec<Vec<u32>>, size: usize, is_within: impl Fn(u32, u32) -> bool) -> Vec<Vec<u32>> {
-    let mut all: Vec<Vec<u32>> = Vec::new();
+    let mut merged: Vec<Vec<u32>> = Vec::new();
     let mut open = None;
     for (number, members) in (0..).zip(groups) {
         let loose = members.len() < size && members.iter().all(|&node| is_within(node, number));
-        match open.filter(|&at: &usize| loose && all[at].len() < size) {
-            Some(at) => all[at].extend(members),
+        match open.filter(|&at: &usize| loose && merged[at].len() < size) {
+            Some(at) => merged[at].extend(members),
             None => {
-                open = if loose { Some(all.len()) } else { open };
-                all.push(members);
+                open = if loose { Some(merged.len()) } else { open };
+                merged.push(members);
             }
         }
     }
-    all
+    merged
 }

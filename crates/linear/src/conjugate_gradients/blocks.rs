@@ -63,21 +63,21 @@ fn to_single(block: &Block, to: &mut SingleBlock) {
 impl BlockMatrix {
     /// The pattern of a matrix, with at most about `most` aggregates.
     pub(crate) fn new(equations: &Equations, matrix: &LowerMatrix, most: usize) -> Self {
-        let mut own: Vec<(u32, [u32; 6])> = Vec::new();
+        let mut nodes: Vec<(u32, [u32; 6])> = Vec::new();
         // Of each node of the model, its place among those with equations.
         let mut place = vec![NONE; equations.number.len() / 6];
         for (node, c) in equations.number.chunks_exact(6).enumerate() {
             if c.iter().any(|&e| e != NONE) {
-                place[node] = own.len() as u32;
-                own.push((node as u32, [c[0], c[1], c[2], c[3], c[4], c[5]]));
+                place[node] = nodes.len() as u32;
+                nodes.push((node as u32, [c[0], c[1], c[2], c[3], c[4], c[5]]));
             }
         }
         let home = |equation: u32| {
             let component = equations.component[equation as usize];
             (place[component as usize / 6] as usize, component as usize % 6)
         };
-        let mut around: Vec<Vec<u32>> = vec![Vec::new(); own.len()];
-        for (a, (_, numbers)) in own.iter().enumerate() {
+        let mut around: Vec<Vec<u32>> = vec![Vec::new(); nodes.len()];
+        for (a, (_, numbers)) in nodes.iter().enumerate() {
             for &column in numbers.iter().filter(|&&e| e != NONE) {
                 for &row in matrix.rows(column) {
                     let b = home(row).0;
@@ -91,7 +91,7 @@ impl BlockMatrix {
             neighbours.dedup();
         }
         let (order, aggregate_start) = aggregates(&around, most);
-        let mut position = vec![0; own.len()];
+        let mut position = vec![0; nodes.len()];
         for (at, &old) in order.iter().enumerate() {
             position[old as usize] = at as u32;
         }
@@ -103,8 +103,8 @@ impl BlockMatrix {
             row_start.push(column.len() as u32);
         }
         let mut blocks = Self {
-            equations: order.iter().map(|&old| own[old as usize].1).collect(),
-            number: order.iter().map(|&old| own[old as usize].0).collect(),
+            equations: order.iter().map(|&old| nodes[old as usize].1).collect(),
+            number: order.iter().map(|&old| nodes[old as usize].0).collect(),
             aggregate_start,
             value: vec![Block::zeros(); column.len()],
             single: Vec::new(),
@@ -149,7 +149,7 @@ impl BlockMatrix {
             row_start: &self.row_start,
             column: &self.column,
             source: self.source.as_flattened(),
-            free: self.equations.iter().map(|own| own.iter().enumerate().map(bit).sum()).collect(),
+            free: self.equations.iter().map(|numbers| numbers.iter().enumerate().map(bit).sum()).collect(),
             aggregate_start: &self.aggregate_start,
             touching,
         }
@@ -195,8 +195,8 @@ impl BlockMatrix {
             });
         }
         let mut inverse = std::mem::take(&mut self.inverse);
-        let own = &*self;
-        let (done, sound) = rayon::join(|| beside(own), || own.invert(&mut inverse));
+        let updated = &*self;
+        let (done, sound) = rayon::join(|| beside(updated), || updated.invert(&mut inverse));
         self.inverse = inverse;
         (sound, done)
     }
@@ -209,16 +209,16 @@ impl BlockMatrix {
     }
 
     pub(super) fn gather(&self, equations: &[f64], nodes: &mut [Node]) {
-        for (own, values) in self.equations.iter().zip(nodes) {
-            for (&equation, value) in own.iter().zip(values) {
+        for (numbers, values) in self.equations.iter().zip(nodes) {
+            for (&equation, value) in numbers.iter().zip(values) {
                 *value = if equation == NONE { 0.0 } else { equations[equation as usize] };
             }
         }
     }
 
     pub(super) fn scatter(&self, nodes: &[Node], equations: &mut [f64]) {
-        for (own, values) in self.equations.iter().zip(nodes) {
-            for (&equation, value) in own.iter().zip(values) {
+        for (numbers, values) in self.equations.iter().zip(nodes) {
+            for (&equation, value) in numbers.iter().zip(values) {
                 if equation != NONE {
                     equations[equation as usize] = *value;
                 }
@@ -280,13 +280,13 @@ pub(super) fn invert(a: &mut [[Pack; 6]; 6]) -> bool {
     for k in 0..6 {
         let row = a[k];
         sound &= row[k].iter().all(|&pivot| pivot > 0.0);
-        for own in &mut *a {
-            let factor: Pack = std::array::from_fn(|lane| own[k][lane] / row[k][lane]);
-            for (own, row) in own.iter_mut().zip(&row) {
-                let lanes = own.iter_mut().zip(row).zip(&factor);
-                lanes.for_each(|((own, row), factor)| *own -= factor * row);
+        for target in &mut *a {
+            let factor: Pack = std::array::from_fn(|lane| target[k][lane] / row[k][lane]);
+            for (entry, row) in target.iter_mut().zip(&row) {
+                let lanes = entry.iter_mut().zip(row).zip(&factor);
+                lanes.for_each(|((number, row), factor)| *number -= factor * row);
             }
-            own[k] = factor.map(|factor| -factor);
+            target[k] = factor.map(|factor| -factor);
         }
         a[k] = row.map(|entry| std::array::from_fn(|lane| entry[lane] / row[k][lane]));
         a[k][k] = row[k].map(|pivot| 1.0 / pivot);

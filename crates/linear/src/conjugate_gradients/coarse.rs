@@ -47,10 +47,10 @@ impl Projected {
         let (mut start, mut aggregates, mut nodes) = (vec![0], Vec::new(), Vec::new());
         for (aggregate, ends) in fine.aggregate_start.windows(2).enumerate() {
             let rows = fine.row_start[ends[0] as usize] as usize..fine.row_start[ends[1] as usize] as usize;
-            let mut own = fine.column[rows].to_vec();
-            own.sort_unstable();
-            own.dedup();
-            nodes.append(&mut own);
+            let mut columns = fine.column[rows].to_vec();
+            columns.sort_unstable();
+            columns.dedup();
+            nodes.append(&mut columns);
             aggregates.resize(nodes.len(), aggregate as u32);
             start.push(nodes.len() as u32);
         }
@@ -178,10 +178,10 @@ impl Coarse {
     /// Takes new positions of the model's nodes.
     pub(crate) fn place(&mut self, fine: &BlockMatrix, position: &[Vector3<f64>]) {
         for ends in fine.aggregate_start.windows(2) {
-            let own = ends[0] as usize..ends[1] as usize;
+            let members = ends[0] as usize..ends[1] as usize;
             let place = |node: usize| position[fine.number[node] as usize];
-            let centre = own.clone().map(place).sum::<Vector3<f64>>() / own.len() as f64;
-            own.for_each(|node| self.arm[node] = place(node) - centre);
+            let centre = members.clone().map(place).sum::<Vector3<f64>>() / members.len() as f64;
+            members.for_each(|node| self.arm[node] = place(node) - centre);
         }
     }
 
@@ -230,9 +230,9 @@ impl Coarse {
         aggregates.with_min_len(16).for_each(|(number, (force, motion))| {
             let nodes = fine.aggregate_start[number] as usize..fine.aggregate_start[number + 1] as usize;
             force.copy_from_slice(&resultant(&r[nodes.clone()], &arm[nodes]));
-            let own = projected.of(number);
-            let blocks = &projected.single[own.clone()];
-            let resisted = fine.arch.dispatch(SingleRow { blocks, columns: &projected.node[own], x: z });
+            let range = projected.of(number);
+            let blocks = &projected.single[range.clone()];
+            let resisted = fine.arch.dispatch(SingleRow { blocks, columns: &projected.node[range], x: z });
             (0..6).for_each(|c| motion[c] = force[c] - resisted[c]);
         });
         self.factors.solve(&mut self.motion);
@@ -242,9 +242,10 @@ impl Coarse {
     /// Motion of a node from the rigid motion of its aggregate.
     #[inline(always)]
     pub(super) fn motion(&self, node: usize) -> Node {
-        let own = 6 * self.aggregate[node] as usize;
-        let [t, w] = [0, 3]
-            .map(|c| Vector3::new(self.motion[own + c], self.motion[own + c + 1], self.motion[own + c + 2]));
+        let first = 6 * self.aggregate[node] as usize;
+        let [t, w] = [0, 3].map(|c| {
+            Vector3::new(self.motion[first + c], self.motion[first + c + 1], self.motion[first + c + 2])
+        });
         let moved = t + w.cross(&self.arm[node]);
         [moved.x, moved.y, moved.z, w.x, w.y, w.z]
     }

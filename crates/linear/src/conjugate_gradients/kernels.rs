@@ -60,13 +60,13 @@ impl WithSimd for Multiply<'_> {
     fn with_simd<S: Simd>(self, simd: S) -> f64 {
         let mut sum = 0.0;
         for (node, ap) in (self.first..).zip(self.ap) {
-            let own = self.matrix.row(node);
-            let (columns, x) = (&self.matrix.column[own.clone()], self.from);
+            let row = self.matrix.row(node);
+            let (columns, x) = (&self.matrix.column[row.clone()], self.from);
             *ap = match self.precision {
                 Precision::Single => {
-                    SingleRow { blocks: &self.matrix.single[own], columns, x }.with_simd(simd)
+                    SingleRow { blocks: &self.matrix.single[row], columns, x }.with_simd(simd)
                 }
-                Precision::Double => BlockRow { blocks: &self.matrix.value[own], columns, x }.with_simd(simd),
+                Precision::Double => BlockRow { blocks: &self.matrix.value[row], columns, x }.with_simd(simd),
             };
             sum += product(ap, &self.from[node]);
         }

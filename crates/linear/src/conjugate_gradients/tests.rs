@@ -12,8 +12,8 @@ use crate::{LinearSolver, Preconditioner, Workspace, dot};
 /// Parts of a number of nodes each, in chains.
 fn chains(parts: u32, nodes: u32) -> Vec<Vec<u32>> {
     let beside = |node: u32| {
-        let own = node / nodes * nodes..(node / nodes + 1) * nodes;
-        (node.saturating_sub(1)..node + 2).filter(|other| own.contains(other)).collect()
+        let chain = node / nodes * nodes..(node / nodes + 1) * nodes;
+        (node.saturating_sub(1)..node + 2).filter(|other| chain.contains(other)).collect()
     };
     (0..parts * nodes).map(beside).collect()
 }
@@ -26,9 +26,9 @@ fn lengths(start: &[u32]) -> Vec<u32> {
 fn many_loose_parts_share_aggregates_where_their_number_is_limited() {
     let around = chains(1000, 4);
     let (order, start) = aggregates(&around, 160);
-    let mut all = order.clone();
-    all.sort_unstable();
-    assert!(all.into_iter().eq(0..4000));
+    let mut sorted = order.clone();
+    sorted.sort_unstable();
+    assert!(sorted.into_iter().eq(0..4000));
     // Seven parts each, the first number with 4000/160 nodes.
     let sizes = lengths(&start);
     assert!(sizes.len() <= 160 && sizes[..sizes.len() - 1].iter().all(|&size| size == 28), "{sizes:?}");
@@ -152,8 +152,8 @@ fn many_blocks_are_solved_in_single_precision() {
 fn blocks_are_inverted_side_by_side() {
     let mut random = Random::new(11);
     let blocks: [Block; PACK] = std::array::from_fn(|_| {
-        let own = Block::from_fn(|_, _| random.number());
-        own.transpose() * own + Block::identity()
+        let factor = Block::from_fn(|_, _| random.number());
+        factor.transpose() * factor + Block::identity()
     });
     let pack = |blocks: &[Block; PACK]| -> [[Pack; 6]; 6] {
         std::array::from_fn(|i| std::array::from_fn(|j| std::array::from_fn(|lane| blocks[lane][(i, j)])))

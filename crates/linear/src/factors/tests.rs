@@ -27,15 +27,15 @@ fn pattern(random: &mut Random, nodes: usize, held: usize) -> LowerMatrix {
 }
 
 fn dense(matrix: &LowerMatrix) -> DMatrix<f64> {
-    let mut all = DMatrix::zeros(matrix.columns(), matrix.columns());
+    let mut full = DMatrix::zeros(matrix.columns(), matrix.columns());
     for column in 0..matrix.columns() {
         let start = matrix.column_start[column] as usize;
         for (&row, &value) in matrix.rows(column as u32).iter().zip(&matrix.value[start..]) {
-            all[(row as usize, column)] = value;
-            all[(column, row as usize)] = value;
+            full[(row as usize, column)] = value;
+            full[(column, row as usize)] = value;
         }
     }
-    all
+    full
 }
 
 /// A x = b for matrices of 6 to 600 equations, positive definite and not; there are as many negative pivots
@@ -55,14 +55,14 @@ fn factors_solve_and_count_negative_eigenvalues() {
             let mut factors = Factors::shared_from(&matrix, 0).unwrap();
             assert!(nodes < 100 || factors.shares[0] < factors.shares[1], "{:?}", factors.shares);
             let pivots = factors.factorise(&matrix).unwrap();
-            let all = dense(&matrix);
-            let eigenvalues = SymmetricEigen::new(all.clone()).eigenvalues;
+            let full = dense(&matrix);
+            let eigenvalues = SymmetricEigen::new(full.clone()).eigenvalues;
             assert_eq!(pivots.negative, eigenvalues.iter().filter(|value| **value < 0.0).count());
             assert!(pivots.smallest > 0.0 && pivots.smallest <= 1.0, "{pivots:?}");
             let mut right = DVector::from_fn(matrix.columns(), |_, _| random.number());
             let mut solution = right.clone();
             factors.solve(solution.as_mut_slice());
-            let error = (&all * &solution - &right).amax() / (all.amax() * solution.amax());
+            let error = (&full * &solution - &right).amax() / (full.amax() * solution.amax());
             assert!(error < 1e-14, "{nodes} nodes, {negative} of 7 negative: {error}");
             // Again with the memory as it was left: the same bits.
             let mut again = right.clone();

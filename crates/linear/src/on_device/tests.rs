@@ -59,8 +59,8 @@ impl DeviceSolver for Narrow {
 /// Springs to the ground at some nodes, on the device of the workspace before.
 fn grounded(nodes: usize, before: Option<&mut Workspace>) -> (Workspace, LowerMatrix) {
     let equations = Equations::new(&vec![true; 6 * nodes]);
-    let all: Vec<[u32; 1]> = (0..nodes as u32).map(|node| [node]).collect();
-    let mut matrix = LowerMatrix::new(&equations, all.iter().map(<[u32; 1]>::as_slice), &[]);
+    let cells: Vec<[u32; 1]> = (0..nodes as u32).map(|node| [node]).collect();
+    let mut matrix = LowerMatrix::new(&equations, cells.iter().map(<[u32; 1]>::as_slice), &[]);
     (0..6 * nodes).for_each(|at| matrix.add_diagonal(at, 2.0));
     let preconditioner = Preconditioner::BlockJacobi;
     let solver = LinearSolver::ConjugateGradients { tolerance: 1e-10, iterations: 100, preconditioner };
