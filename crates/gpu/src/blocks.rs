@@ -123,18 +123,18 @@ impl DeviceBlocks {
         for end in ends {
             // In the order of the model, so that histories and shapes are read in long runs.
             order[first..end].sort_unstable();
-            let own = nodes_of(cells, &order[first..end]);
-            let mut at_nodes = vec![Vec::new(); own.len()];
+            let block_nodes = nodes_of(cells, &order[first..end]);
+            let mut at_nodes = vec![Vec::new(); block_nodes.len()];
             for (place, &cell) in order[first..end].iter().enumerate() {
                 for (a, node) in cells.nodes(cell as usize).iter().enumerate() {
-                    let local = own.partition_point(|known| known < node);
+                    let local = block_nodes.partition_point(|known| known < node);
                     corners[a / 4 * cells.len() + first + place][a % 4] = local as u8;
                     at_nodes[local].push((a * group + place) as u16);
                 }
             }
-            let origin = model.rest[own[0] as usize];
+            let origin = model.rest[block_nodes[0] as usize];
             rest.extend(
-                own.iter().flat_map(|&node| sub(model.rest[node as usize], origin)).map(|x| x as f32),
+                block_nodes.iter().flat_map(|&node| sub(model.rest[node as usize], origin)).map(|x| x as f32),
             );
             for at_node in at_nodes {
                 given.extend(at_node);
@@ -145,9 +145,9 @@ impl DeviceBlocks {
                 first_cell: first as u32,
                 cells: (end - first) as u32,
                 first_node: nodes.len() as u32,
-                nodes: own.len() as u32,
+                nodes: block_nodes.len() as u32,
             });
-            nodes.extend(own);
+            nodes.extend(block_nodes);
             first = end;
         }
         let arrays = [
@@ -240,9 +240,9 @@ impl NodeBlocks {
     /// # Errors
     /// If the data of one node do not fit into the memory that a group shares.
     pub(crate) fn of_solids(device: &Device, model: &Model) -> Result<Vec<Self>, GpuError> {
-        let all = |solid: &Solid| (0..solid.cells.len() as u32).collect::<Vec<_>>();
+        let cells_of = |solid: &Solid| (0..solid.cells.len() as u32).collect::<Vec<_>>();
         let mut nodes: Vec<_> =
-            model.solids.iter().map(|solid| nodes_of(&solid.cells, &all(solid))).collect();
+            model.solids.iter().map(|solid| nodes_of(&solid.cells, &cells_of(solid))).collect();
         let last = model.solids.len().saturating_sub(1);
         let mut of_node = vec![(u32::MAX, last as u32); model.node_count()];
         for (solid, nodes) in (0..).zip(&nodes) {
@@ -285,10 +285,10 @@ impl NodeBlocks {
             cells.nodes(cell).iter().for_each(|&node| at_node[node as usize].push(cell as u32));
         }
         let cells_at =
-            |own: &[u32]| sorted(own.iter().flat_map(|&n| &at_node[n as usize]).copied().collect());
+            |owned: &[u32]| sorted(owned.iter().flat_map(|&n| &at_node[n as usize]).copied().collect());
         let limit = device.adapter().shared_memory as usize;
         let most = (limit.saturating_sub(shared_memory(0)) / 12).min(MOST_NODES);
-        let fits = |own: &[u32]| nodes_of(cells, &cells_at(own)).len() <= most;
+        let fits = |owned: &[u32]| nodes_of(cells, &cells_at(owned)).len() <= most;
         let mut ends = Vec::new();
         Bisection { places: &model.rest, whole: MOST_OWN, fits: &fits }.cut(&mut order, 0, &mut ends);
 
@@ -304,29 +304,29 @@ impl NodeBlocks {
         let mut first = 0;
         for end in ends {
             order[first..end].sort_unstable();
-            let own = &order[first..end];
-            let block_cells = cells_at(own);
+            let owned = &order[first..end];
+            let block_cells = cells_at(owned);
             let mut around = nodes_of(cells, &block_cells);
             let (neighbours, needed) = (around.len(), shared_memory(around.len()));
             if needed > limit {
-                let (adapter, node) = (device.adapter().name.clone(), own[0]);
+                let (adapter, node) = (device.adapter().name.clone(), owned[0]);
                 let (needed, limit) = (needed as u64, limit as u64);
                 return Err(GpuError::Crowded { adapter, node, neighbours, needed, limit });
             }
-            around.retain(|node| own.binary_search(node).is_err());
-            let local = |node: &u32| match own.binary_search(node) {
+            around.retain(|node| owned.binary_search(node).is_err());
+            let local = |node: &u32| match owned.binary_search(node) {
                 Ok(place) => place,
-                Err(_) => own.len() + around.partition_point(|known| known < node),
+                Err(_) => owned.len() + around.partition_point(|known| known < node),
             };
             locals.extend(block_cells.iter().flat_map(|&cell| cells.nodes(cell as usize)).map(local));
-            let count = own.len() + around.len();
+            let count = owned.len() + around.len();
             cut.blocks.push(Block {
                 first_cell: cut.cells.len() as u32,
                 cells: block_cells.len() as u32,
                 first_node: cut.nodes.len() as u32,
-                nodes: (own.len() << 16 | count) as u32,
+                nodes: (owned.len() << 16 | count) as u32,
             });
-            cut.nodes.extend(own.iter().chain(&around).map(|&node| marked(node)));
+            cut.nodes.extend(owned.iter().chain(&around).map(|&node| marked(node)));
             cut.cells.extend(block_cells);
             cut.most_nodes = cut.most_nodes.max(count);
             first = end;

@@ -46,7 +46,7 @@ pub(crate) fn add_passages(
     numbers: &mut Vec<f32>,
 ) {
     for (index, rigid) in (0..).zip(&contacts.rigids) {
-        let leg = driven.iter().find(|(own, _)| *own == index).map(|(_, leg)| leg);
+        let leg = driven.iter().find(|(moved, _)| *moved == index).map(|(_, leg)| leg);
         numbers.extend(Passage::new(rigid, times.map(|time| rigid.stance(time, leg))).numbers());
     }
 }
@@ -237,9 +237,13 @@ fn common(device: &Device, contacts: &Contacts, is_shared: bool, has_pairs: bool
 }
 
 /// Makes the rows, including rows of pairs.
-fn rows(memory: &Memory<'_>, own: usize, pairs: Option<&DevicePairs>) -> Result<wgpu::Buffer, GpuError> {
+fn rows(
+    memory: &Memory<'_>,
+    of_things: usize,
+    pairs: Option<&DevicePairs>,
+) -> Result<wgpu::Buffer, GpuError> {
     let of_pairs = pairs.map_or(0, |pairs| PAIR_ROW * pairs.most_rows);
-    memory.zeros("the points that touch", (own + of_pairs) * size_of::<Four>())
+    memory.zeros("the points that touch", (of_things + of_pairs) * size_of::<Four>())
 }
 
 /// Binds the arrays of kernels of contacts, besides the nodes.
@@ -250,7 +254,7 @@ fn bound(
     [forces, sums]: [&wgpu::Buffer; 2],
     pairs: Option<&DevicePairs>,
 ) -> Bound {
-    let mut own = vec![
+    let mut bindings = vec![
         Binding::Read(surface),
         Binding::Read(things),
         Binding::Read(numbers),
@@ -261,9 +265,9 @@ fn bound(
         Binding::Write(sums),
     ];
     if let Some(DevicePairs { candidates, listed, queue, .. }) = pairs {
-        own.extend([Binding::Read(candidates), Binding::Read(listed), Binding::Write(queue)]);
+        bindings.extend([Binding::Read(candidates), Binding::Read(listed), Binding::Write(queue)]);
     }
-    nodes.of_contacts(device, &own)
+    nodes.of_contacts(device, &bindings)
 }
 
 /// Returns the invocations of the group that solves all rows. The group waits after each colour and level.
@@ -331,8 +335,9 @@ impl Touched {
             };
             surface.nodes.iter().for_each(|&node| at_node[place_of(node)].push(index));
             let longest = surface.longest_edge(|node| rest[node as usize].into());
-            let own = FacePoints::new(&surface.faces, longest, &rigids[rigid].shape, rigids[rigid].inside);
-            let most = own.most();
+            let face_points =
+                FacePoints::new(&surface.faces, longest, &rigids[rigid].shape, rigids[rigid].inside);
+            let most = face_points.most();
             // Edges may be twice as long as at rest.
             let beyond = if most == 0 { 0.0 } else { 2.0 * longest };
             let numbers = [touch.friction, touch.offset, MARGIN * longest, beyond].map(|x| x as f32);
@@ -344,11 +349,11 @@ impl Touched {
             if most > 0 {
                 for (number, face) in surface.faces.iter().enumerate() {
                     let face = face.map(|node| place_of(node) as u32);
-                    faces.entry(face).or_default().contacts.push((index, own.edges(number)));
+                    faces.entry(face).or_default().contacts.push((index, face_points.edges(number)));
                 }
             }
-            if let FacePoints::Lattice(own) = own {
-                points.extend(own);
+            if let FacePoints::Lattice(lattice) = face_points {
+                points.extend(lattice);
             }
         }
         let first_point = things.len();
@@ -429,9 +434,9 @@ impl Lists {
         numbers.extend((0..colours).map(begins));
         let first_sum = numbers.len();
         let mut end = first_sum + places.of_contacts.len() + 1;
-        for own in &places.of_contacts {
+        for places_of_contact in &places.of_contacts {
             numbers.push(end as u32);
-            end += own.len();
+            end += places_of_contact.len();
         }
         numbers.push(end as u32);
         numbers.extend(places.of_contacts.concat());

@@ -309,9 +309,9 @@ impl Gradients {
         let pivots = sizes.bind(device, memory);
         let bound = arrays.bind(device, sizes);
         let [expand, scatter, invert, multiply, update, coarse, turn] = std::array::from_fn(|number| {
-            let [name, before, own] = KERNELS[number];
+            let [name, before, snippet] = KERNELS[number];
             let bound: Vec<&Bound> = std::iter::once(&pivots).chain(&bound[number]).collect();
-            Kernel::new(device, name, &[], &[SIZES, before, own], &bound, 0)
+            Kernel::new(device, name, &[], &[SIZES, before, snippet], &bound, 0)
         });
         Ok(Self {
             kernels: [expand?, scatter?, invert?, multiply?, update?, coarse?, turn?],
@@ -492,8 +492,8 @@ impl DeviceSolver for Gradients {
 /// The aggregate of each node, and which of its components have an equation.
 fn homes(pattern: &BlockPattern<'_>) -> Vec<[u32; 2]> {
     let groups = (0..).zip(pattern.aggregate_start.windows(2));
-    let nodes = groups.flat_map(|(own, ends): (u32, _)| (ends[0]..ends[1]).map(move |_| own));
-    nodes.zip(&pattern.free).map(|(own, &free)| [own, free]).collect()
+    let nodes = groups.flat_map(|(aggregate, ends): (u32, _)| (ends[0]..ends[1]).map(move |_| aggregate));
+    nodes.zip(&pattern.free).map(|(aggregate, &free)| [aggregate, free]).collect()
 }
 
 /// A place in ordinary memory that the device copies from; it stays, since a new one of some megabytes takes

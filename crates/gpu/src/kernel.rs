@@ -334,8 +334,8 @@ impl Kernel {
 
     /// Works with other arrays of a group, bound alike.
     pub(crate) fn rebind(&mut self, group: usize, to: &Bound) {
-        for (own, to) in self.bound.iter_mut().zip(&to.groups) {
-            own[group - 1] = to.clone();
+        for (bound, to) in self.bound.iter_mut().zip(&to.groups) {
+            bound[group - 1] = to.clone();
         }
     }
 

@@ -37,7 +37,7 @@ fn part_of([x, y, z, w]: Four, weights: Vector<f64>) -> Four {
     match w.to_bits() {
         CORNER => {
             let weight = [a, b, c].into_iter().find(|&weight| weight != 0.0).unwrap_or(0.0);
-            let given = [a, b, c].map(|own| u32::from(own != 0.0));
+            let given = [a, b, c].map(|factor| u32::from(factor != 0.0));
             let components = given[0] | given[1] << 1 | given[2] << 2;
             [x, weight * y, f32::from_bits(z.to_bits() & components), w]
         }
@@ -116,9 +116,9 @@ impl DeviceLoads {
             }
         }
         for (node, row) in model.ties.iter().flat_map(Tie::component_rows) {
-            let own = std::mem::take(&mut entries[node as usize]);
+            let tied_entries = std::mem::take(&mut entries[node as usize]);
             for (followed, weights) in row {
-                entries[followed as usize].extend(own.iter().map(|&entry| part_of(entry, weights)));
+                entries[followed as usize].extend(tied_entries.iter().map(|&entry| part_of(entry, weights)));
             }
         }
         let mut offsets = vec![0];

@@ -175,7 +175,7 @@ impl DeviceNodes {
     }
 
     /// Binds the arrays of nodes that contacts work on, with the contacts' own arrays.
-    pub(crate) fn of_contacts(&self, device: &Device, own: &[Binding<'_>]) -> Bound {
+    pub(crate) fn of_contacts(&self, device: &Device, contact_arrays: &[Binding<'_>]) -> Bound {
         let bindings = [
             Binding::ReadNow(&self.displacement),
             Binding::ReadNow(&self.increment),
@@ -186,7 +186,7 @@ impl DeviceNodes {
             Binding::Nothing,
             Binding::Nothing,
         ];
-        Bound::new(device, &[&bindings[..], own].concat())
+        Bound::new(device, &[&bindings[..], contact_arrays].concat())
     }
 
     /// Binds the arrays of blocks of nodes; `left` has the forces that blocks leave.

@@ -23,7 +23,7 @@ const ANYWHERE: f32 = 1e30;
 /// The pairs of bodies of a model.
 pub(crate) struct DevicePairs {
     /// The contact of each, its lists, and the sign of its forces.
-    own: Vec<(usize, Pairs, f64)>,
+    lists: Vec<(usize, Pairs, f64)>,
     touches: Vec<Touch>,
     /// Places [m] at rest of the nodes that touch, by their own numbers, and their numbers in the model.
     rest: Vec<Vector3<f64>>,
@@ -58,21 +58,21 @@ impl DevicePairs {
         let number = |node: u32| nodes.partition_point(|&known| known < node) as u32;
         let rest: Vec<Vector3<f64>> = nodes.iter().map(|&node| rest[node as usize].into()).collect();
         let mut watched = vec![false; nodes.len()];
-        let mut own = Vec::new();
+        let mut lists = Vec::new();
         for (index, contact) in contacts.contacts.iter().enumerate() {
             let Some((pairs, sign)) = contacts.pairs(index, number, |node| rest[node as usize]) else {
                 continue;
             };
             let surfaces = contact.surfaces().flat_map(|surface| &surface.nodes);
             surfaces.for_each(|&node| watched[number(node) as usize] = true);
-            own.push((index, pairs, sign));
+            lists.push((index, pairs, sign));
         }
-        if own.is_empty() {
+        if lists.is_empty() {
             return Ok(None);
         }
         let empty = memory.zeros("the pairs that touch", 0)?;
-        let mut all = Self {
-            own,
+        let mut device_pairs = Self {
+            lists,
             touches: contacts.contacts.iter().map(|contact| contact.touch).collect(),
             rest,
             nodes: nodes.to_vec(),
@@ -85,9 +85,9 @@ impl DevicePairs {
             numbers: Vec::new(),
             places: Vec::new(),
         };
-        all.find(&vec![Four::default(); nodes.len()]);
-        all.grow(memory)?;
-        Ok(Some(all))
+        device_pairs.find(&vec![Four::default(); nodes.len()]);
+        device_pairs.grow(memory)?;
+        Ok(Some(device_pairs))
     }
 
     /// Lists candidates with nodes of the model at displacements [m]; uploads them. Whether arrays are others
@@ -106,7 +106,7 @@ impl DevicePairs {
 
     /// Lists candidates with these displacements [m] of the nodes that touch.
     fn find(&mut self, moved: &[Four]) {
-        let Self { own, touches, rest, watched, numbers, places, .. } = self;
+        let Self { lists, touches, rest, watched, numbers, places, .. } = self;
         places.clear();
         if !moved.iter().flatten().all(|x| x.is_finite()) {
             // The device finds the error.
@@ -126,7 +126,7 @@ impl DevicePairs {
         let (mut point_count, mut crossing_count) = (0, 0);
         let mut room = f64::INFINITY;
         let row_count = |rows: &[u32]| (rows.len() / 5) as u32;
-        for (contact, pairs, sign) in own.iter_mut() {
+        for (contact, pairs, sign) in lists.iter_mut() {
             room = room.min(pairs.list_again(place));
             let [offset, reach, depth] = pairs.lengths();
             let friction = touches[*contact].friction;
@@ -179,7 +179,7 @@ impl DevicePairs {
                 .zip(watched.iter())
                 .map(|(&[x, y, z, _], &watched)| [x, y, z, if watched { -room as f32 } else { 0.0 }]),
         );
-        for &node in own.iter().flat_map(|(_, pairs, _)| pairs.near()) {
+        for &node in lists.iter().flat_map(|(_, pairs, _)| pairs.near()) {
             places[node as usize][3] = room as f32;
         }
     }

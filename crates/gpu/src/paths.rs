@@ -187,8 +187,8 @@ impl Paths {
         let followers = nodes.followers.as_ref();
         let number = |node: u32| followers.and_then(|followers| followers.number(node));
         let followed = followers.into_iter().flat_map(Followers::followed);
-        let own = slots.clone().filter(|&(_, node)| number(node).is_none());
-        let taken = own.chain((first_given as u32..).zip(followed.clone()));
+        let independent = slots.clone().filter(|&(_, node)| number(node).is_none());
+        let taken = independent.chain((first_given as u32..).zip(followed.clone()));
         let forces = memory.zeros(what, (first_given + followed.count()) * size_of::<Four>())?;
         let listed = |(offsets, slots): (Vec<u32>, Vec<u32>)| -> Result<[wgpu::Buffer; 2], GpuError> {
             Ok([memory.filled(lists, &offsets)?, memory.filled(lists, &slots)?])
@@ -197,8 +197,8 @@ impl Paths {
         let [offsets, of_node] = listed(by_rows(nodes.count, taken.map(turned)))?;
         let giving = match followers {
             Some(followers) => {
-                let own = slots.filter_map(|(slot, node)| Some((slot, number(node)?)));
-                let lists = listed(by_rows(followers.count, own.map(turned)))?;
+                let following = slots.filter_map(|(slot, node)| Some((slot, number(node)?)));
+                let lists = listed(by_rows(followers.count, following.map(turned)))?;
                 Some(followers.among_slots(device, &forces, &lists, first_given))
             }
             None => None,

@@ -192,12 +192,13 @@ impl GpuShells {
         if forces.is_empty() && !self.pushed {
             return;
         }
-        let mut all = vec![[0.0; 3]; self.model.rest.len()];
+        let mut pushes = vec![[0.0; 3]; self.model.rest.len()];
         for &(node, force) in forces {
-            all[node as usize].iter_mut().zip(force).for_each(|(sum, f)| *sum += f);
+            pushes[node as usize].iter_mut().zip(force).for_each(|(sum, f)| *sum += f);
         }
-        let all: Vec<Four> = all.into_iter().map(|f| [f[0] as f32, f[1] as f32, f[2] as f32, 0.0]).collect();
-        self.device.queue.write_buffer(&self.pushes, 0, bytemuck::cast_slice(&all));
+        let pushes: Vec<Four> =
+            pushes.into_iter().map(|f| [f[0] as f32, f[1] as f32, f[2] as f32, 0.0]).collect();
+        self.device.queue.write_buffer(&self.pushes, 0, bytemuck::cast_slice(&pushes));
         self.pushed = !forces.is_empty();
     }
 
@@ -314,12 +315,12 @@ impl Kernels<'_> {
         &self,
         name: &str,
         snippets: [&str; 2],
-        (own, pressure): (&[Binding<'_>], Option<&Bound>),
+        (arrays, pressure): (&[Binding<'_>], Option<&Bound>),
         invocations: usize,
     ) -> Result<Kernel, GpuError> {
         let constants = [("FACETS", self.model.facets.len()), ("NODES", self.model.rest.len())];
-        let own = Bound::new(self.device, own);
-        let groups: Vec<&Bound> = [self.bound, &own].into_iter().chain(pressure).collect();
+        let arrays = Bound::new(self.device, arrays);
+        let groups: Vec<&Bound> = [self.bound, &arrays].into_iter().chain(pressure).collect();
         Kernel::new(self.device, name, &constants, &snippets, &groups, invocations)
     }
 
@@ -333,7 +334,7 @@ impl Kernels<'_> {
         let rest = memory.filled("the stiffness of facets", &at_rest(model))?;
         let forces = memory.zeros("the forces of facets", facets.len() * 96)?;
         let pressed = Pressed::new(memory, device, model)?;
-        let own = [
+        let arrays = [
             Binding::Read(self.places),
             Binding::Read(&corners),
             Binding::Read(&rest),
@@ -346,7 +347,7 @@ impl Kernels<'_> {
             Some(_) => include_str!("shaders/shells/pressure.wgsl"),
         };
         let pressure = pressed.as_ref().map(|pressed| &pressed.bound);
-        let kernel = self.kernel("facets", [head, press], (&own, pressure), facets.len())?;
+        let kernel = self.kernel("facets", [head, press], (&arrays, pressure), facets.len())?;
         Ok(FacetForces { kernel, forces, pressed })
     }
 
@@ -363,8 +364,8 @@ impl Kernels<'_> {
         let nodes = model.rest.len();
         let kinds = memory.filled("the masses of nodes", &kinds(model, step))?;
         let motions = memory.filled("the motions of nodes", motions)?;
-        let corners = model.facets.iter().enumerate().flat_map(|(facet, own)| {
-            own.nodes.into_iter().zip(0..).map(move |(node, corner)| (node, 3 * facet as u32 + corner))
+        let corners = model.facets.iter().enumerate().flat_map(|(facet, triangle)| {
+            triangle.nodes.into_iter().zip(0..).map(move |(node, corner)| (node, 3 * facet as u32 + corner))
         });
         let (corner_starts, corners) = by_rows(nodes, corners);
         let corner_starts = memory.filled("the corners of nodes", &corner_starts)?;
@@ -372,7 +373,7 @@ impl Kernels<'_> {
         let (load_starts, loads) = by_rows(nodes, nodal_loads(model));
         let load_starts = memory.filled("the loads of nodes", &load_starts)?;
         let loads = memory.filled("the loads of nodes", &loads)?;
-        let own = [
+        let arrays = [
             Binding::Write(self.places),
             Binding::Write(self.rates),
             Binding::Read(&kinds),
@@ -391,7 +392,7 @@ impl Kernels<'_> {
             Some(_) => include_str!("shaders/shells/given.wgsl"),
         };
         let given = pressed.as_ref().map(|pressed| Bound::new(device, &[Binding::Read(&pressed.given)]));
-        self.kernel("shell nodes", [head, give], (&own, given.as_ref()), nodes)
+        self.kernel("shell nodes", [head, give], (&arrays, given.as_ref()), nodes)
     }
 }
 
@@ -399,17 +400,17 @@ impl Kernels<'_> {
 fn moved_nodes(model: &Assembly) -> (Vec<Moved>, Vec<u32>) {
     let mut places = vec![NONE; model.rest.len()];
     let (mut moved, mut next) = (Vec::new(), model.loads.len() as u32);
-    for (constraint, own) in model.constraints.iter().enumerate() {
-        if matches!(own.motion, Motion::Fixed) {
+    for (constraint, condition) in model.constraints.iter().enumerate() {
+        if matches!(condition.motion, Motion::Fixed) {
             continue;
         }
-        for (index, &node) in own.nodes.iter().enumerate() {
+        for (index, &node) in condition.nodes.iter().enumerate() {
             let place = &mut places[node as usize];
             if *place == NONE {
                 *place = next;
                 next += 6;
             }
-            moved.push(Moved { constraint, index, components: own.components, place: *place as usize });
+            moved.push(Moved { constraint, index, components: condition.components, place: *place as usize });
         }
     }
     (moved, places)
@@ -419,16 +420,16 @@ fn moved_nodes(model: &Assembly) -> (Vec<Moved>, Vec<u32>) {
 fn at_rest(model: &Assembly) -> Vec<f32> {
     let facets = model.facets.len();
     let mut numbers = vec![0.0; AT_REST * facets];
-    for (facet, own) in model.facets.iter().enumerate() {
-        let rest = own.at_rest();
+    for (facet, triangle) in model.facets.iter().enumerate() {
+        let rest = triangle.at_rest();
         let half = (0..18).flat_map(|row| (0..=row).map(move |column| (row, column)));
-        let all = half
+        let constants = half
             .map(|at| rest.stiffness[at])
             .chain(rest.tension.iter().copied())
             .chain(rest.gradient.iter().flat_map(|g| [g.x, g.y]))
             .chain(rest.corners.iter().flat_map(|c| [c.x, c.y]))
             .chain(rest.axes.iter().copied());
-        for (entry, number) in all.enumerate() {
+        for (entry, number) in constants.enumerate() {
             numbers[entry * facets + facet] = number as f32;
         }
     }
@@ -463,11 +464,11 @@ fn nodal_loads(model: &Assembly) -> impl Iterator<Item = (u32, [Four; 2])> + Clo
     model.loads.iter().enumerate().flat_map(move |(number, load)| -> Vec<(u32, [Four; 2])> {
         let none = [0.0; 3];
         match &load.kind {
-            LoadKind::Forces(all) => {
-                all.iter().map(|&(at, force)| (at, entry(number, force, none))).collect()
+            LoadKind::Forces(forces) => {
+                forces.iter().map(|&(at, force)| (at, entry(number, force, none))).collect()
             }
-            LoadKind::Moments(all) => {
-                all.iter().map(|&(at, moment)| (at, entry(number, none, moment))).collect()
+            LoadKind::Moments(moments) => {
+                moments.iter().map(|&(at, moment)| (at, entry(number, none, moment))).collect()
             }
             LoadKind::Gravity { body, acceleration } => model.bodies[*body]
                 .nodes
@@ -532,11 +533,14 @@ fn normals(model: &Assembly) -> Vec<[Four; 3]> {
     let of_facet = |(number, facet): (u32, &pliant_shells::Facet)| {
         let patch = surface.patch(model, &rest, number);
         let axes: Matrix3<f64> = facet.at_rest().axes;
-        let straight =
-            patch.straight().iter().enumerate().fold(0_u32, |bits, (k, own)| bits | u32::from(*own) << k);
+        let straight = patch
+            .straight()
+            .iter()
+            .enumerate()
+            .fold(0_u32, |bits, (k, is_straight)| bits | u32::from(*is_straight) << k);
         patch.normals().map(|normal| {
-            let own = axes.tr_mul(&normal);
-            [own.x as f32, own.y as f32, own.z as f32, f32::from_bits(straight)]
+            let local = axes.tr_mul(&normal);
+            [local.x as f32, local.y as f32, local.z as f32, f32::from_bits(straight)]
         })
     };
     (0..).zip(&model.facets).map(of_facet).collect()

@@ -80,7 +80,7 @@ impl SolidKernels<'_> {
     ///
     /// # Errors
     /// If the device lacks what one needs.
-    pub(crate) fn all(&self) -> Result<Vec<Kernel>, GpuError> {
+    pub(crate) fn in_order(&self) -> Result<Vec<Kernel>, GpuError> {
         Ok(match &self.solid.cells {
             Cells::Tet4(_) => vec![self.tets(&[include_str!("shaders/tet4.wgsl")])?],
             Cells::Hex8(_) => {
@@ -88,8 +88,8 @@ impl SolidKernels<'_> {
                 vec![self.forces(&[HEX_CORNERS, growth, include_str!("shaders/hex8.wgsl")])?]
             }
             Cells::FullHex8(..) => {
-                let own = include_str!("shaders/full_hex8.wgsl");
-                vec![self.forces(&[PRESSURE_HISTORY, HEX_CORNERS, own])?]
+                let snippet = include_str!("shaders/full_hex8.wgsl");
+                vec![self.forces(&[PRESSURE_HISTORY, HEX_CORNERS, snippet])?]
             }
             Cells::Membrane(..) => vec![self.forces(&[include_str!("shaders/membrane.wgsl")])?],
             Cells::Bar(..) => vec![self.forces(&[include_str!("shaders/bar.wgsl")])?],
@@ -106,12 +106,12 @@ impl SolidKernels<'_> {
         let of_pressure = include_str!("shaders/averaged_pressure.wgsl");
         Ok(match averaging {
             Averaging::Nodal => {
-                let own = [PRESSURE_HISTORY, include_str!("shaders/node_pressures.wgsl")];
-                vec![changes, self.of_nodes("pressures at nodes", &own)?, forces(of_pressure)?]
+                let pressure_snippets = [PRESSURE_HISTORY, include_str!("shaders/node_pressures.wgsl")];
+                vec![changes, self.of_nodes("pressures at nodes", &pressure_snippets)?, forces(of_pressure)?]
             }
             Averaging::Variational => {
-                let own = [PRESSURE_HISTORY, include_str!("shaders/cell_pressures.wgsl")];
-                let pressures = self.of_cells("pressures of cells", &own)?;
+                let pressure_snippets = [PRESSURE_HISTORY, include_str!("shaders/cell_pressures.wgsl")];
+                let pressures = self.of_cells("pressures of cells", &pressure_snippets)?;
                 vec![changes, means()?, pressures, means()?, forces(of_pressure)?]
             }
             Averaging::NiftySim => {
@@ -128,15 +128,20 @@ impl SolidKernels<'_> {
 
     /// Forces of cells, one by one or in blocks.
     fn forces(&self, snippets: &[&str]) -> Result<Kernel, GpuError> {
-        let (name, own) = (self.solid.cells.element(), self.paths.cell_snippet.as_str());
+        let (name, cell_snippet) = (self.solid.cells.element(), self.paths.cell_snippet.as_str());
         let groups = [self.instant, self.bound, &self.paths.cells];
         let Some(blocks) = self.blocks else {
-            return self.kernel(name, &[snippets, &[own]].concat(), &groups, self.solid.cells.len());
+            return self.kernel(name, &[snippets, &[cell_snippet]].concat(), &groups, self.solid.cells.len());
         };
         let stored = self.paths.finds_shapes && !self.finds_shapes;
         let stored = if stored { include_str!("shaders/block_stored.wgsl") } else { "" };
         let groups = [&groups[..], &[&blocks.bound]].concat();
-        self.kernel(name, &[snippets, &[own, stored]].concat(), &groups, blocks.count * GROUP as usize)
+        self.kernel(
+            name,
+            &[snippets, &[cell_snippet, stored]].concat(),
+            &groups,
+            blocks.count * GROUP as usize,
+        )
     }
 
     /// A value of each cell, for averages.
@@ -147,8 +152,8 @@ impl SolidKernels<'_> {
 
     /// A value of each averaged node.
     fn of_nodes(&self, name: &str, snippets: &[&str]) -> Result<Kernel, GpuError> {
-        let own = include_str!("shaders/node_averages.wgsl");
-        let snippets = [&[AVERAGES], snippets, &[own]].concat();
+        let node_averages = include_str!("shaders/node_averages.wgsl");
+        let snippets = [&[AVERAGES], snippets, &[node_averages]].concat();
         self.kernel(name, &snippets, &[self.instant, self.averaging, &self.paths.cells], self.local_nodes)
     }
 

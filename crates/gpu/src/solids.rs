@@ -27,8 +27,9 @@ fn shader_of(solid: &Solid) -> Result<Shader, GpuError> {
         let what = format!("`{}` with `{}`, which has no volumetric energy,", cells.element(), law.name());
         return Err(GpuError::Unsupported { what });
     }
-    let own = || GpuError::Unsupported { what: format!("`{}`, a law that the program gives,", law.name()) };
-    let mut shader = law.shader().ok_or_else(own)?;
+    let no_shader =
+        || GpuError::Unsupported { what: format!("`{}`, a law that the program gives,", law.name()) };
+    let mut shader = law.shader().ok_or_else(no_shader)?;
     if law.is_incompressible() {
         // A membrane does not ask for the volumetric part: no infinity goes to the device.
         shader.parameters.iter_mut().filter(|parameter| parameter.is_infinite()).for_each(|p| *p = 0.0);
@@ -145,7 +146,7 @@ impl DeviceSolid {
             bound: &bound,
             averaging: averaging.as_ref().unwrap_or(&bound),
         };
-        let kernels = kernels.all()?;
+        let kernels = kernels.in_order()?;
         let series = (parameters.len() * size_of::<Four>()) as u64;
         Ok(Self { kernels, histories, orders: [order, pressure_order], packs, constants, series })
     }

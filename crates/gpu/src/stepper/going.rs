@@ -52,19 +52,21 @@ impl GpuStepper {
         }
         let mut found = u32::MAX;
         let findings = &self.instants.findings;
-        self.transfer.read::<u32>(&self.device, findings, UNLISTED + 1, |all| found = all[UNLISTED])?;
+        self.transfer
+            .read::<u32>(&self.device, findings, UNLISTED + 1, |numbers| found = numbers[UNLISTED])?;
         Ok((found != u32::MAX).then_some(found))
     }
 
     /// Lists candidates for contact anew, from the displacements on a side.
     pub(super) fn list(&mut self, side: usize) -> Result<(), GpuError> {
-        let Some(contacts) = self.forces.contacts.as_mut().filter(|own| own.has_pairs()) else {
+        let Some(contacts) = self.forces.contacts.as_mut().filter(|contacts| contacts.has_pairs()) else {
             return Ok(());
         };
         let (nodes, device) = (&self.nodes, &self.device);
         let (from, mut listed) = (&nodes.displacement[side], Ok(()));
-        self.transfer
-            .read::<Four>(device, from, nodes.count, |all| listed = contacts.list(device, nodes, all))?;
+        self.transfer.read::<Four>(device, from, nodes.count, |displacements| {
+            listed = contacts.list(device, nodes, displacements)
+        })?;
         self.instants.go_on(device);
         listed
     }

@@ -83,15 +83,15 @@ impl Observable<f32> for GpuStepper {
 
     /// Belongs to the last instant of which everything was wanted.
     fn velocity(&self, state: &State<f32>, node: usize) -> Vector<f64> {
-        let own = |node: u32| {
+        let by_increments = |node: u32| {
             let (before, after) = (state.increment[node as usize], self.readings.next[node as usize]);
             [0, 1, 2].map(|c| self.lengths.velocity(before[c].into(), after[c].into()))
         };
-        let alone = own(node as u32);
+        let alone = by_increments(node as u32);
         if self.forces.ties.is_none() {
             return alone;
         }
-        let followed = weighted(self.model.resolved(&[(node as u32, 1.0)]), own);
+        let followed = weighted(self.model.resolved(&[(node as u32, 1.0)]), by_increments);
         [0, 1, 2].map(|c| if self.owners[node][c] == FREE { followed[c] } else { alone[c] })
     }
 }
@@ -168,7 +168,7 @@ impl GpuStepper {
         let nodes = DeviceNodes::new(memory, model, &owners, blocks)?;
         let instants = Instants::new(memory, device, model, contacts.clone())?;
         let forces = Forces::new((memory, device), (model, contacts), (&nodes, &instants), design, cut)?;
-        let contacts = forces.contacts.as_ref().map_or(0, |own| own.contacts.contacts.len());
+        let contacts = forces.contacts.as_ref().map_or(0, |of_device| of_device.contacts.contacts.len());
         Ok(Self {
             device: device.clone(),
             model: Arc::clone(model),
@@ -427,17 +427,21 @@ impl GpuStepper {
         let three = |four: &Four| [four[0], four[1], four[2]];
         let mut read = |buffer: &wgpu::Buffer, each: usize, to: &mut dyn FnMut(usize, &[Four])| {
             transfer.read::<Four>(device, buffer, each * count, |fours| {
-                fours.chunks_exact(each).enumerate().for_each(|(node, own)| to(node, own));
+                fours.chunks_exact(each).enumerate().for_each(|(node, values)| to(node, values));
             })
         };
         let side = self.stage.side();
-        read(&self.nodes.displacement[side], 1, &mut |node, own| state.displacement[node] = three(&own[0]))?;
-        read(&self.nodes.next[side], OF_NODE, &mut |node, own| self.readings.next[node] = three(&own[0]))?;
-        read(&self.nodes.increment[side], OF_NODE, &mut |node, own| {
-            state.increment[node] = three(&own[0]);
-            for (forces, own) in state.forces.iter_mut().zip(&own[1..]) {
+        read(&self.nodes.displacement[side], 1, &mut |node, values| {
+            state.displacement[node] = three(&values[0])
+        })?;
+        read(&self.nodes.next[side], OF_NODE, &mut |node, values| {
+            self.readings.next[node] = three(&values[0])
+        })?;
+        read(&self.nodes.increment[side], OF_NODE, &mut |node, values| {
+            state.increment[node] = three(&values[0]);
+            for (forces, value) in state.forces.iter_mut().zip(&values[1..]) {
                 if let Some(force) = forces.get_mut(node) {
-                    *force = three(own);
+                    *force = three(value);
                 }
             }
         })?;

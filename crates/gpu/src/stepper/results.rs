@@ -39,8 +39,8 @@ impl GpuStepper {
         let (forces, kernels, side) = (&self.forces, &self.kernels, self.stage.side());
         let sum = forces.contacts.as_ref().map(|contacts| &contacts.sum);
         self.instants.submit(&self.device, |pass, bound, _, offset| {
-            let all = forces.kernels(anew).chain(sum).chain([&kernels.pass]);
-            all.for_each(|kernel| kernel.run(pass, bound, offset, side));
+            let sequence = forces.kernels(anew).chain(sum).chain([&kernels.pass]);
+            sequence.for_each(|kernel| kernel.run(pass, bound, offset, side));
         });
         self.results()
     }
@@ -55,7 +55,7 @@ impl GpuStepper {
             (&nodes.reactions, bytes(nodes.held.len() * 4)),
         ];
         let touching = bytes(self.readings.contact_forces.len() * 4);
-        arrays.extend(self.forces.contacts.iter().map(|own| (&own.sums, touching)));
+        arrays.extend(self.forces.contacts.iter().map(|contacts| (&contacts.sums, touching)));
         let mut read = None;
         self.transfer.read_all(&self.device, &arrays, |parts| {
             let mut sums = [0.0; SUMS];

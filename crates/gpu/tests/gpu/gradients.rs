@@ -41,18 +41,22 @@ fn tube(around: u32, along: u32) -> Assembly {
     let counts = [around, along].map(|count| count as usize);
     let mut model = shell(&support::triangles(cylinder, counts, Pattern::Diagonal));
     let facets = (0..model.facets.len() as u32).collect();
-    let own = model.model_mut();
-    own.fix("foot", (0..around).collect());
-    own.fix("head", (around * along..around * (along + 1)).collect());
-    let hinge = own.constraints.last_mut().unwrap();
+    let assembly = model.model_mut();
+    assembly.fix("foot", (0..around).collect());
+    assembly.fix("head", (around * along..around * (along + 1)).collect());
+    let hinge = assembly.constraints.last_mut().unwrap();
     hinge.components = [true, true, true, false, false, false];
     let pulse = (0..40).map(|i| (0.25 * f64::from(i), f64::from(i % 2))).collect();
     let curve = Curve { shape: Shape::Table(pulse), from: 0.0, to: 1.0 };
     let kind = LoadKind::ShellPressure { facets, pressure: 1000.0, spread: Spread::Curved };
-    own.loads.push(Load::new("pressure", kind, curve));
+    assembly.loads.push(Load::new("pressure", kind, curve));
     let hold = Curve { shape: Shape::Hold, from: 0.0, to: 1.0 };
-    own.loads.push(Load::new("weight", LoadKind::Gravity { body: 0, acceleration: [0.0, -9.81, 0.0] }, hold));
-    own.bodies[0].damping = 1.0;
+    assembly.loads.push(Load::new(
+        "weight",
+        LoadKind::Gravity { body: 0, acceleration: [0.0, -9.81, 0.0] },
+        hold,
+    ));
+    assembly.bodies[0].damping = 1.0;
     model
 }
 
@@ -214,10 +218,10 @@ fn balloon() -> Assembly {
     let neck = neck.collect();
     let faces = model.facets.iter().map(|facet| facet.nodes).map(|[a, b, c]| [a, b, c, NO_NODE]).collect();
     let nodes = (0..model.rest.len() as u32).collect();
-    let own = model.model_mut();
-    own.fix("neck", neck);
+    let assembly = model.model_mut();
+    assembly.fix("neck", neck);
     let enclosure = Enclosure { faces, facets: Vec::new() };
-    own.constraints.push(Constraint {
+    assembly.constraints.push(Constraint {
         name: "air".into(),
         nodes,
         components: [false; 6],
@@ -280,8 +284,10 @@ fn chain(solver: &mut dyn DeviceSolver, nodes: u32) -> Vec<f32> {
         row_start.push(column.len() as u32);
     }
     let count = nodes / 5;
-    let touching: Vec<[u32; 2]> =
-        (0..count).flat_map(|own| [[own, own], [own + 1, own]]).filter(|pair| pair[0] < count).collect();
+    let touching: Vec<[u32; 2]> = (0..count)
+        .flat_map(|aggregate| [[aggregate, aggregate], [aggregate + 1, aggregate]])
+        .filter(|pair| pair[0] < count)
+        .collect();
     let diagonal = |number: f32| (0..36).map(move |at| if at % 7 == 0 { number } else { 0.0 });
     // Five times 4, less eight times 1; 1 between aggregates.
     let coarse: Vec<f32> =
@@ -291,7 +297,7 @@ fn chain(solver: &mut dyn DeviceSolver, nodes: u32) -> Vec<f32> {
         column: &column,
         source: &source,
         free: vec![63; nodes as usize],
-        aggregate_start: &(0..=count).map(|own| 5 * own).collect::<Vec<_>>(),
+        aggregate_start: &(0..=count).map(|aggregate| 5 * aggregate).collect::<Vec<_>>(),
         touching: Some(touching),
     };
     let inverse: Vec<f32> = (0..nodes).flat_map(|_| diagonal(0.25)).collect();
@@ -343,10 +349,10 @@ fn many_loose_pieces_are_solved_with_few_aggregates() {
     let cells =
         (0..600).flat_map(|k| [[0, 1, 2], [0, 2, 3]].map(|cell: [u32; 3]| cell.map(|node| 4 * k + node)));
     model.add_shell(&Shell::new("wall", cells.collect(), 0.002, WALL)).unwrap();
-    let own = model.model_mut();
-    own.fix("pins", (0..600).map(|k| 4 * k).collect());
+    let assembly = model.model_mut();
+    assembly.fix("pins", (0..600).map(|k| 4 * k).collect());
     let weight = LoadKind::Gravity { body: 0, acceleration: [0.0, 0.0, -9.81] };
-    own.loads.push(Load::new("weight", weight, Curve { shape: Shape::Hold, from: 0.0, to: 1.0 }));
+    assembly.loads.push(Load::new("weight", weight, Curve { shape: Shape::Hold, from: 0.0, to: 1.0 }));
     let settings = DynamicSettings::new(STEP);
     let exact = run(None, &model, settings.real_time(LinearSolver::Direct), 4).0;
     let settings = settings.real_time(gradients(1e-9, Preconditioner::Aggregates));

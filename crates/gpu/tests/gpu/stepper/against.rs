@@ -167,7 +167,7 @@ fn errors(
 /// limits, up to a hundred times the given ones.
 fn agree(what: &str, errors: [f64; 4], of_processor: [f64; 4], velocities_within: f64) {
     let [of_device, of_single] =
-        [errors, of_processor].map(|all| all.map(|error| format!("{error:.1e}")).join(", "));
+        [errors, of_processor].map(|errors| errors.map(|error| format!("{error:.1e}")).join(", "));
     println!("{what}: {of_device}; the processor in single precision {of_single}");
     let limits = [1e-5, velocities_within, 1e-4, 1e-4];
     for (k, name) in ["displacements", "velocities", "energies", "reactions"].into_iter().enumerate() {

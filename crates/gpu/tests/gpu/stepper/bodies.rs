@@ -45,7 +45,7 @@ fn askew(at: [f64; 3]) -> Isometry3<f64> {
 
 /// Makes contacts of the first solid with the second, or with itself if there is no second, and with things.
 fn touching(model: &Model, rigids: Vec<Rigid>, friction: f64) -> Arc<Contacts> {
-    let own = surface(&model.solids[0]);
+    let skin = surface(&model.solids[0]);
     let with = model.solids.get(1).map_or(With::Itself, |second| With::Body(surface(second)));
     let touch = Touch { friction, offset: 1e-4 };
     let last = model.solids.last().map(surface).unwrap_or_default();
@@ -56,7 +56,7 @@ fn touching(model: &Model, rigids: Vec<Rigid>, friction: f64) -> Arc<Contacts> {
         touch,
     });
     let mut contacts: Vec<Contact> = at_things.collect();
-    contacts.push(Contact { name: "touch".into(), surface: own, with, touch });
+    contacts.push(Contact { name: "touch".into(), surface: skin, with, touch });
     Arc::new(Contacts { rigids, contacts, ..Default::default() })
 }
 

@@ -33,13 +33,14 @@ pub(super) fn surface(solid: &Solid) -> Surface {
             sides.entry(key).or_insert_with(Vec::new).push(side);
         }
     }
-    let outer = sides.into_values().filter(|own| own.len() == 1).flatten();
+    let outer = sides.into_values().filter(|sharing| sharing.len() == 1).flatten();
     let mut faces: Vec<[u32; 3]> = outer.collect();
     faces.sort_unstable();
     let mut coloured: Vec<(usize, [u32; 3])> = Vec::new();
     for face in faces {
         let beside = |other: &[u32; 3]| other.iter().any(|node| face.contains(node));
-        let is_free = |colour: &usize| coloured.iter().all(|(own, other)| own != colour || !beside(other));
+        let is_free =
+            |colour: &usize| coloured.iter().all(|(taken, other)| taken != colour || !beside(other));
         coloured.push(((0..).find(is_free).unwrap(), face));
     }
     coloured.sort_by_key(|&(colour, _)| colour);
@@ -85,7 +86,9 @@ pub(super) fn compare(
     for forces in compare_touching(device, what, (model, contacts), 0.5 * step_of(model), designs) {
         let largest = forces.iter().map(|[a, ..]| Vector3::from(*a).norm()).fold(0.0, f64::max);
         let [off, of_processor] = [1, 2].map(|other| {
-            let apart = forces.iter().map(|own| (Vector3::from(own[0]) - Vector3::from(own[other])).norm());
+            let apart = forces
+                .iter()
+                .map(|of_node| (Vector3::from(of_node[0]) - Vector3::from(of_node[other])).norm());
             apart.fold(0.0, f64::max) / largest
         });
         println!(
@@ -344,8 +347,8 @@ pub(super) fn time_of(stepper: &mut GpuStepper, model: &Model, what: &str) -> f6
 
 /// Processor time of this program [s], where Linux has it, in steps of a hundredth.
 fn processor_time() -> Option<f64> {
-    let told = std::fs::read_to_string("/proc/self/stat").ok()?;
-    let (_, numbers) = told.rsplit_once(')')?;
+    let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
+    let (_, numbers) = stat.rsplit_once(')')?;
     let numbers: Vec<f64> = numbers.split_whitespace().filter_map(|number| number.parse().ok()).collect();
     // The state before them is a letter.
     Some((numbers.get(10)? + numbers.get(11)?) / 100.0)

@@ -69,20 +69,20 @@ fn shuffle<T>(random: &mut Random, items: &mut [T]) {
 /// Nodes and hexahedra; inner nodes are shifted by up to half of `jitter` cells.
 fn grid(jitter: f64, random: &mut Random) -> (Vec<Vector<f64>>, Vec<[u32; 8]>) {
     let size = EDGE / f64::from(CELLS);
-    let all =
+    let triples =
         |end: u32| (0..end).flat_map(move |z| (0..end).flat_map(move |y| (0..end).map(move |x| [x, y, z])));
     let shifted = |at: [u32; 3]| {
         let interior = at.iter().all(|&i| i > 0 && i < CELLS);
         let shift = if interior { vector(random) } else { [0.0; 3] };
         [0, 1, 2].map(|c| (f64::from(at[c]) + jitter * shift[c]) * size)
     };
-    let rest = all(CELLS + 1).map(shifted).collect();
+    let rest = triples(CELLS + 1).map(shifted).collect();
     let hex = |[x, y, z]: [u32; 3]| {
         let low = [place(x, y, z), place(x + 1, y, z), place(x + 1, y + 1, z), place(x, y + 1, z)];
         let [a, b, c, d] = low.map(|node| node + place(0, 0, 1));
         [low[0], low[1], low[2], low[3], a, b, c, d]
     };
-    (rest, all(CELLS).map(hex).collect())
+    (rest, triples(CELLS).map(hex).collect())
 }
 
 /// Kuhn's split: all six tets around the diagonal 0–6.
@@ -95,7 +95,7 @@ pub fn tets_of(hexes: &[[u32; 8]]) -> Vec<[u32; 4]> {
 /// A block of `cells` cells of six tetrahedra along each edge, of a size [m] from the origin on.
 pub fn tet_block(cells: [u32; 3], size: [f64; 3]) -> (Vec<Vector<f64>>, Vec<[u32; 4]>) {
     let [nx, ny, nz] = cells;
-    let all = |[nx, ny, nz]: [u32; 3]| {
+    let triples = |[nx, ny, nz]: [u32; 3]| {
         (0..nz).flat_map(move |z| (0..ny).flat_map(move |y| (0..nx).map(move |x| [x, y, z])))
     };
     let point = |at: [u32; 3]| [0, 1, 2].map(|c| size[c] * f64::from(at[c]) / f64::from(cells[c]));
@@ -106,8 +106,8 @@ pub fn tet_block(cells: [u32; 3], size: [f64; 3]) -> (Vec<Vector<f64>>, Vec<[u32
         let [e, f, g, h] = low.map(node);
         [e, f, g, h, a, b, c, d]
     };
-    let hexes: Vec<[u32; 8]> = all([nx, ny, nz]).map(hex).collect();
-    (all([nx + 1, ny + 1, nz + 1]).map(point).collect(), tets_of(&hexes))
+    let hexes: Vec<[u32; 8]> = triples([nx, ny, nz]).map(hex).collect();
+    (triples([nx + 1, ny + 1, nz + 1]).map(point).collect(), tets_of(&hexes))
 }
 
 /// Builds a body of one element type.
@@ -303,8 +303,10 @@ pub fn every_law() -> Vec<AnyLaw> {
 }
 
 fn merged(mut parameters: Value, extra: Value) -> Value {
-    let (Value::Object(all), Value::Object(extra)) = (&mut parameters, extra) else { panic!("not a table") };
-    all.extend(extra);
+    let (Value::Object(table), Value::Object(extra)) = (&mut parameters, extra) else {
+        panic!("not a table")
+    };
+    table.extend(extra);
     parameters
 }
 

@@ -60,7 +60,7 @@ fn tie(model: &mut Model, name: &str, nodes: Vec<u32>) {
 }
 
 fn lattice(counts: [u32; 3], point: impl Fn([u32; 3]) -> Vector<f64>) -> (Vec<Vector<f64>>, Vec<[u32; 8]>) {
-    let all = |[x, y, z]: [u32; 3]| {
+    let triples = |[x, y, z]: [u32; 3]| {
         (0..z).flat_map(move |k| (0..y).flat_map(move |j| (0..x).map(move |i| [i, j, k])))
     };
     let [x, y, _] = counts;
@@ -69,7 +69,7 @@ fn lattice(counts: [u32; 3], point: impl Fn([u32; 3]) -> Vector<f64>) -> (Vec<Ve
         [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]]
             .map(|[a, b, c]: [u32; 3]| number([i + a, j + b, k + c]))
     };
-    (all(counts.map(|count| count + 1)).map(point).collect(), all(counts).map(hex).collect())
+    (triples(counts.map(|count| count + 1)).map(point).collect(), triples(counts).map(hex).collect())
 }
 
 fn constraint(name: &str, nodes: Vec<u32>, motion: Motion) -> Constraint {
@@ -147,9 +147,9 @@ fn barred(mut model: Model) -> Model {
 #[test]
 fn tied_blocks_of_other_meshes_are_pulled() {
     let Some(device) = support::device() else { return };
-    let all = with_ties(&device);
+    let supported = with_ties(&device);
     for (lower, upper, designs) in [
-        ("tet4", "hex8", &all[..]),
+        ("tet4", "hex8", &supported[..]),
         ("hex8", "tet4", PLAIN),
         ("tet4-anp", "tet4-anp", PLAIN),
         ("hex8-full", "tet4", PLAIN),
@@ -167,17 +167,22 @@ fn a_membrane_and_embedded_bars_follow_a_solid() {
         compare(&device, &format!("a wall on {element}"), &walled(held_loaded(element)), designs);
         compare(&device, &format!("bars in {element}"), &barred(cube), designs);
     }
-    let mut all = walled(barred(moved_cube("tet4", elastic(neo_hookean()))));
-    all.initial_velocity = all.rest.iter().map(|x| [0.5 * x[2], 0.0, -0.8 * x[2]]).collect();
-    let follows = all.followers();
-    all.initial_velocity.iter_mut().zip(follows).filter(|(_, own)| *own).for_each(|(v, _)| *v = [0.0; 3]);
-    all.bodies[0].damping = 1.0;
-    mass_scaling::scale_mass(&mut all, Goal::Share(0.2)).unwrap();
+    let mut model = walled(barred(moved_cube("tet4", elastic(neo_hookean()))));
+    model.initial_velocity = model.rest.iter().map(|x| [0.5 * x[2], 0.0, -0.8 * x[2]]).collect();
+    let follows = model.followers();
+    model
+        .initial_velocity
+        .iter_mut()
+        .zip(follows)
+        .filter(|(_, is_follower)| *is_follower)
+        .for_each(|(v, _)| *v = [0.0; 3]);
+    model.bodies[0].damping = 1.0;
+    mass_scaling::scale_mass(&mut model, Goal::Share(0.2)).unwrap();
     compare_from(
         &device,
         "a wall and bars, with mass scaling and initial velocities",
-        (&all, &vec![[0.0; 3]; all.node_count()]),
-        0.5 * step_of(&all),
+        (&model, &vec![[0.0; 3]; model.node_count()]),
+        0.5 * step_of(&model),
         PLAIN,
     );
 }
@@ -270,9 +275,9 @@ fn steps_of_tied_bodies_give_the_same_bits_divided_and_resumed() {
     let step = step_of(&model);
     for design in with_ties(&device).into_iter().filter(|&design| design != Design::FloatAtomics) {
         let mut whole = State::<f32>::at_rest(&model);
-        let mut all = stepper(&device, &model, step, design);
-        all.advance(&mut whole, 210).unwrap();
-        all.evaluate(&mut whole, Wanted::Everything).unwrap();
+        let mut undivided = stepper(&device, &model, step, design);
+        undivided.advance(&mut whole, 210).unwrap();
+        undivided.evaluate(&mut whole, Wanted::Everything).unwrap();
         let mut divided = State::<f32>::at_rest(&model);
         let mut first = stepper(&device, &model, step, design);
         for steps in [1, 2, 87] {
@@ -295,9 +300,9 @@ fn steps_of_tied_bodies_give_the_same_bits_divided_and_resumed() {
             stepper.evaluate(&mut state, Wanted::Everything).unwrap();
             assert!(state.displacement == whole.displacement, "{design}, {what}");
             assert!(state.increment == whole.increment && state.history == whole.history, "{design}, {what}");
-            let (a, b) = (all.energies(), stepper.energies());
+            let (a, b) = (undivided.energies(), stepper.energies());
             for (a, b) in numbers(a).into_iter().zip(numbers(b)) {
-                assert!((a - b).abs() < 1e-5 * all.energies().external, "{design}, {what}: {a} {b}");
+                assert!((a - b).abs() < 1e-5 * undivided.energies().external, "{design}, {what}: {a} {b}");
             }
         }
     }
