@@ -26,11 +26,11 @@ impl FacePoints {
     /// Returns the points of faces with edges up to a length [m] at a thing that bodies are outside of, or
     /// within.
     pub fn new(faces: &[[u32; 3]], longest: f64, shape: &Shape, inside: bool) -> Self {
-        let all = lattice(parts_of(longest, shape));
+        let points = lattice(parts_of(longest, shape));
         let (radius, half) = match *shape {
-            Shape::Sphere { radius } if !inside && !all.is_empty() => (radius, 0.0),
-            Shape::Capsule { radius, length } if !inside && !all.is_empty() => (radius, 0.5 * length),
-            _ => return Self::Lattice(all),
+            Shape::Sphere { radius } if !inside && !points.is_empty() => (radius, 0.0),
+            Shape::Capsule { radius, length } if !inside && !points.is_empty() => (radius, 0.5 * length),
+            _ => return Self::Lattice(points),
         };
         Self::Nearest(NearestPoints { radius, half, edges: first_edges(faces) })
     }
@@ -38,7 +38,7 @@ impl FacePoints {
     /// Largest number of points of a face.
     pub fn most(&self) -> usize {
         match self {
-            Self::Lattice(all) => all.len(),
+            Self::Lattice(points) => points.len(),
             Self::Nearest(NearestPoints { half, .. }) if *half > 0.0 => 11,
             Self::Nearest(_) => 4,
         }
@@ -166,17 +166,17 @@ mod tests {
                     continue;
                 }
                 tried += 1;
-                let mut own =
+                let mut closest =
                     corners.iter().map(|corner| shape.near(corner).distance).fold(f64::INFINITY, f64::min);
                 let mut count = 0;
                 nearest.of(0, &corners, 10.0, |weights| {
                     assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);
-                    own = own.min(distance(&weights));
+                    closest = closest.min(distance(&weights));
                     count += 1;
                 });
                 // Those that are too far away are left out.
                 nearest.of(0, &corners, 0.1, |weights| assert!(distance(&weights) < 0.1 + 1e-12));
-                assert!(own <= least + 1e-12 && count <= points.most(), "{own} m, {least} m");
+                assert!(closest <= least + 1e-12 && count <= points.most(), "{closest} m, {least} m");
             }
         }
     }

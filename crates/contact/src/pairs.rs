@@ -106,7 +106,7 @@ impl Point<'_> {
     pub fn faces(&self) -> impl Iterator<Item = ([u32; 3], [bool; 3])> {
         let face = |&[_, face]: &[u32; 2]| self.other.faces[face as usize];
         let is_at_border = |node: u32| self.other.border.binary_search(&node).is_ok();
-        self.list.iter().map(move |own| (face(own), face(own).map(is_at_border)))
+        self.list.iter().map(move |pair| (face(pair), face(pair).map(is_at_border)))
     }
 }
 
@@ -162,16 +162,16 @@ impl Side {
     }
 
     /// The triangles around a node, by its place among the nodes.
-    fn ring(&self, own: usize) -> &[[u32; 2]] {
-        let first = own.checked_sub(1).map_or(0, |before| self.ring_ends[before]);
-        &self.rings[first..self.ring_ends[own]]
+    fn ring(&self, index: usize) -> &[[u32; 2]] {
+        let first = index.checked_sub(1).map_or(0, |before| self.ring_ends[before]);
+        &self.rings[first..self.ring_ends[index]]
     }
 
     /// The outward normal of a node, by its place among the nodes.
-    fn outward(&self, own: usize, place: &impl Fn(u32) -> Vector3<f64>) -> Vector3<f64> {
-        let at = place(self.nodes[own]);
+    fn outward(&self, index: usize, place: &impl Fn(u32) -> Vector3<f64>) -> Vector3<f64> {
+        let at = place(self.nodes[index]);
         let area = |&[b, c]: &[u32; 2]| (place(b) - at).cross(&(place(c) - at));
-        self.ring(own).iter().map(area).sum::<Vector3<f64>>().try_normalize(0.0).unwrap_or_default()
+        self.ring(index).iter().map(area).sum::<Vector3<f64>>().try_normalize(0.0).unwrap_or_default()
     }
 
     /// The square of the longest way [m²] of a node since candidates were listed.
@@ -235,7 +235,7 @@ impl Pairs {
         place: impl Fn(u32) -> Vector3<f64>,
     ) -> Self {
         let sides: Vec<Side> =
-            [Some(first), second].into_iter().flatten().map(|own| Side::new(own, &place)).collect();
+            [Some(first), second].into_iter().flatten().map(|surface| Side::new(surface, &place)).collect();
         let edges = sides.iter().flat_map(|side| &side.edges);
         let (sum, count) = edges.fold((0.0, 0.0_f64), |(sum, count), edge| {
             let [a, b] = edge.ends.map(&place);
@@ -245,11 +245,12 @@ impl Pairs {
         let [reach, skin, depth] = [REACH, SKIN, DEPTH].map(|part| part * mean);
         let (points, crossings, room, apart, near) = Default::default();
         let kept = Vec::new();
-        let mut own = Self { sides, offset, kept, reach, skin, depth, points, crossings, room, apart, near };
+        let mut pairs =
+            Self { sides, offset, kept, reach, skin, depth, points, crossings, room, apart, near };
         if second.is_none() {
-            own.set_apart(&place, AT_REST * offset);
+            pairs.set_apart(&place, AT_REST * offset);
         }
-        own
+        pairs
     }
 
     /// Nodes that keep a smaller distance [m] than the others, with that distance. Parts of a surface that
@@ -377,14 +378,14 @@ impl Pairs {
         for (number, side) in sides.iter().enumerate() {
             let (list, other) = (&mut points[number], other(number));
             list.clear();
-            for ((&node, at), own) in side.nodes.iter().zip(&side.listed).zip(0..) {
+            for ((&node, at), index) in side.nodes.iter().zip(&side.listed).zip(0..) {
                 let wanted = Bounds::of([*at]).grown(reach);
                 let first = list.len();
                 other.face_tree.near(&wanted, |face| {
                     let corners = other.faces[face as usize];
                     let meets = !corners.contains(&node) && around(corners, place).touches(&wanted);
-                    if meets && apart[0].binary_search(&[own, face]).is_err() {
-                        list.push([own, face]);
+                    if meets && apart[0].binary_search(&[index, face]).is_err() {
+                        list.push([index, face]);
                     }
                 });
                 list[first..].sort_unstable();
@@ -479,8 +480,8 @@ impl Pairs {
                 room = rest;
                 let near =
                     list.iter().zip(rooms).filter(|(_, room)| **room <= closed).map(|([_, face], _)| *face);
-                let own = (list[0][0] as usize, side);
-                self.find_above(own, (near, self.other(number)), &place, &mut rows, |pair| {
+                let of_node = (list[0][0] as usize, side);
+                self.find_above(of_node, (near, self.other(number)), &place, &mut rows, |pair| {
                     if wanted(&pair) {
                         found(Pair { in_order: number == 0, ..pair });
                     }
@@ -490,11 +491,11 @@ impl Pairs {
         let other = self.other(0);
         let mut room = &self.room[2][..];
         for list in self.crossings.chunk_by(|a, b| a[0] == b[0]) {
-            let (own, rest) = room.split_at(list.len());
+            let (rooms, rest) = room.split_at(list.len());
             room = rest;
             let first = &self.sides[0].edges[list[0][0] as usize];
             let near = around(first.ends, &place).grown(within);
-            for (&[_, second], _) in list.iter().zip(own).filter(|(_, room)| **room <= closed) {
+            for (&[_, second], _) in list.iter().zip(rooms).filter(|(_, room)| **room <= closed) {
                 let second = &other.edges[second as usize];
                 // Boxes are compared in a fifth of the time of closest points.
                 if !around(second.ends, &place).touches(&near) {
@@ -520,13 +521,13 @@ impl Pairs {
     /// it. `rows` is memory for pairs.
     fn find_above(
         &self,
-        (own, side): (usize, &Side),
+        (index, side): (usize, &Side),
         (list, other): (impl Iterator<Item = u32>, &Side),
         place: &impl Fn(u32) -> Vector3<f64>,
         rows: &mut Vec<(u32, Pair)>,
         mut found: impl FnMut(Pair),
     ) {
-        let node = side.nodes[own];
+        let node = side.nodes[index];
         let point = place(node);
         let within = self.within();
         let wanted = Bounds::of([point]).grown(within);
@@ -551,7 +552,7 @@ impl Pairs {
             if !Bounds::of(corners).touches(&wanted) || is_beyond(within, &corners, &point) {
                 continue;
             }
-            let outward = *outward.get_or_insert_with(|| side.outward(own, place));
+            let outward = *outward.get_or_insert_with(|| side.outward(index, place));
             let mut here = Above::of(&corners, &point, BESIDE);
             if here.is_beside() && here.normal.dot(&outward) > -FACING {
                 here = Above::of(&corners, &point, 0.0);

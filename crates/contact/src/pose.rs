@@ -128,7 +128,7 @@ impl Trajectory {
                 back * self.start
             }
             Motion::Table(poses) => {
-                let after = poses.partition_point(|&(own, _)| own <= time);
+                let after = poses.partition_point(|&(moment, _)| moment <= time);
                 let pose = match (after.checked_sub(1).map(|before| poses[before]), poses.get(after)) {
                     (Some((from, a)), Some((to, b))) => between([&a, b], (time - from) / (to - from)),
                     (Some((_, only)), None) => only,

@@ -50,9 +50,9 @@ pub fn shader(rigids: &[Rigid]) -> String {
     ];
     let numbers = constants(&numbers);
     let kinds: String = (KINDS.iter().enumerate())
-        .map(|(own, name)| {
-            let is_there = rigids.iter().any(|rigid| kind(&rigid.shape) == own);
-            format!("const {name} = {own}u;\nconst HAS_{name} = {is_there};\n")
+        .map(|(number, name)| {
+            let is_there = rigids.iter().any(|rigid| kind(&rigid.shape) == number);
+            format!("const {name} = {number}u;\nconst HAS_{name} = {is_there};\n")
         })
         .collect();
     [&numbers, &kinds, include_str!("exact.wgsl"), include_str!("shape.wgsl"), include_str!("touch.wgsl")]

@@ -86,33 +86,33 @@ impl Shape {
     /// have one side with a continuous gradient, shorter than 1 where it rounds corners.
     pub fn sides(&self, point: &Vector3<f64>) -> Sides {
         let side = |distance, normal| Some(Near { distance, normal });
-        let mut all = [None; MOST_SIDES];
+        let mut sides = [None; MOST_SIDES];
         match self {
             Self::Cuboid { size } => {
-                for (at, found) in all.iter_mut().enumerate() {
+                for (at, found) in sides.iter_mut().enumerate() {
                     let (axis, sign) = (at / 2, if at % 2 == 0 { -1.0 } else { 1.0 });
                     *found = side(sign * point[axis] - 0.5 * size[axis], Vector3::ith(axis, sign));
                 }
             }
             Self::Cylinder { radius, length } => {
-                all[0] = Some(around(Vector3::new(point.x, point.y, 0.0), *radius));
-                all[1] = side(-point.z - 0.5 * length, -Vector3::z());
-                all[2] = side(point.z - 0.5 * length, Vector3::z());
+                sides[0] = Some(around(Vector3::new(point.x, point.y, 0.0), *radius));
+                sides[1] = side(-point.z - 0.5 * length, -Vector3::z());
+                sides[2] = side(point.z - 0.5 * length, Vector3::z());
             }
             Self::Cone { radius, height } => {
                 let from_axis = Vector2::new(point.x, point.y);
                 let radial = from_axis.try_normalize(0.0).unwrap_or(Vector2::x());
                 let flat = Vector2::new(*height, *radius).normalize();
                 let distance = flat.x * (from_axis.norm() - radius) + flat.y * point.z;
-                all[0] = side(-point.z, -Vector3::z());
-                all[1] = side(distance, Vector3::new(radial.x * flat.x, radial.y * flat.x, flat.y));
+                sides[0] = side(-point.z, -Vector3::z());
+                sides[1] = side(distance, Vector3::new(radial.x * flat.x, radial.y * flat.x, flat.y));
             }
-            Self::Grid(grid) => all[0] = Some(grid.smooth(point)),
+            Self::Grid(grid) => sides[0] = Some(grid.smooth(point)),
             Self::Sphere { .. } | Self::Capsule { .. } | Self::HalfSpace | Self::Revolved(_) => {
-                all[0] = Some(self.near(point));
+                sides[0] = Some(self.near(point));
             }
         }
-        all
+        sides
     }
 
     /// The least distance [m] that a point can go through it; infinite of a half-space.
@@ -382,15 +382,15 @@ mod tests {
             for _ in 0..2000 {
                 let point = Vector3::from_fn(|_, _| random.part() - 0.5);
                 let near = shape.near(&point);
-                let all = sides(&point);
+                let found = sides(&point);
                 if near.distance >= 0.0 {
                     continue;
                 }
                 inside += 1;
-                let nearest = all.iter().map(|side| side.distance).fold(f64::NEG_INFINITY, f64::max);
+                let nearest = found.iter().map(|side| side.distance).fold(f64::NEG_INFINITY, f64::max);
                 assert!((nearest - near.distance).abs() < 1e-12, "{shape:?} at {point}: {nearest}");
                 let h = 1e-6;
-                for (k, side) in all.iter().enumerate().filter(|(_, side)| side.distance > -0.05) {
+                for (k, side) in found.iter().enumerate().filter(|(_, side)| side.distance > -0.05) {
                     for c in 0..3 {
                         let mut step = Vector3::zeros();
                         step[c] = h;

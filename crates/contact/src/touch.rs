@@ -140,9 +140,9 @@ impl Rigid {
     /// for each of [`Shape::sides`], any other thing one for the nearest part of the surface.
     pub fn sides(&self, stance: &Stance, point: &Vector3<f64>) -> Sides {
         if !self.inside {
-            let mut all = Sides::default();
-            all[0] = Some(self.near(stance, point));
-            return all;
+            let mut sides = Sides::default();
+            sides[0] = Some(self.near(stance, point));
+            return sides;
         }
         let Stance { pose, growth } = stance;
         let local = pose.inverse_transform_point(&(*point).into());
@@ -275,7 +275,7 @@ pub struct Passage {
 impl Passage {
     /// Makes the passage in the step from one stance to another.
     pub fn new(rigid: &Rigid, stances: [Stance; 2]) -> Self {
-        let (poses, growth) = (stances.map(|own| own.pose), stances.map(|own| own.growth));
+        let (poses, growth) = (stances.map(|stance| stance.pose), stances.map(|stance| stance.growth));
         let [before, after] = poses;
         let turn = after.rotation.to_rotation_matrix().into_inner();
         let half_thinnest = 0.5 * (rigid.shape.thinnest() + growth[0].min(growth[1]));
@@ -479,8 +479,8 @@ pub struct Contacts {
 
 /// Points on a triangle besides its corners, by their weights: a lattice with `parts` parts of an edge.
 pub fn lattice(parts: usize) -> Vec<[f64; 3]> {
-    let all = (0..=parts).flat_map(|i| (0..=parts - i).map(move |j| [i, j, parts - i - j]));
-    let inner = all.filter(|point| !point.contains(&parts));
+    let points = (0..=parts).flat_map(|i| (0..=parts - i).map(move |j| [i, j, parts - i - j]));
+    let inner = points.filter(|point| !point.contains(&parts));
     inner.map(|point| point.map(|k| k as f64 / parts as f64)).collect()
 }
 

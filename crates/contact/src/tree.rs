@@ -18,7 +18,9 @@ impl Bounds {
     #[inline]
     pub fn of<const N: usize>(points: [Vector3<f64>; N]) -> Self {
         let start = Self { low: points[0], high: points[0] };
-        points[1..].iter().fold(start, |all, x| Self { low: lower(&all.low, x), high: higher(&all.high, x) })
+        points[1..]
+            .iter()
+            .fold(start, |bounds, x| Self { low: lower(&bounds.low, x), high: higher(&bounds.high, x) })
     }
 
     /// The box with a margin [m] on all sides.
@@ -112,24 +114,24 @@ impl Tree {
         self.surface = self.parts.iter().map(|part| part.bounds.area()).sum();
     }
 
-    fn halve(&mut self, own: &mut [u32], first: usize, boxes: &[Bounds]) {
-        let around = own.iter().map(|&thing| boxes[thing as usize]).reduce(|a, b| a.with(&b));
+    fn halve(&mut self, things: &mut [u32], first: usize, boxes: &[Bounds]) {
+        let around = things.iter().map(|&thing| boxes[thing as usize]).reduce(|a, b| a.with(&b));
         let Some(bounds) = around else { return };
         let number = self.parts.len();
         self.parts.push(Part {
             bounds,
             first: first as u32,
-            end: (first + own.len()) as u32,
+            end: (first + things.len()) as u32,
             after: number as u32 + 1,
         });
-        if own.len() <= FEW {
+        if things.len() <= FEW {
             return;
         }
         let axis = (bounds.high - bounds.low).imax();
         let middle = |thing: u32| boxes[thing as usize].low[axis] + boxes[thing as usize].high[axis];
-        let half = own.len() / 2;
-        own.select_nth_unstable_by(half, |&a, &b| middle(a).total_cmp(&middle(b)).then(a.cmp(&b)));
-        let (left, right) = own.split_at_mut(half);
+        let half = things.len() / 2;
+        things.select_nth_unstable_by(half, |&a, &b| middle(a).total_cmp(&middle(b)).then(a.cmp(&b)));
+        let (left, right) = things.split_at_mut(half);
         self.halve(left, first, boxes);
         self.halve(right, first + half, boxes);
         self.parts[number].after = self.parts.len() as u32;
@@ -195,8 +197,9 @@ mod tests {
                 tree.near(&wanted, |thing| found.push(thing));
                 found.retain(|&thing| around(&places, thing).touches(&wanted));
                 found.sort_unstable();
-                let all = 0..places.len() as u32;
-                let brute: Vec<u32> = all.filter(|&thing| around(&places, thing).touches(&wanted)).collect();
+                let indices = 0..places.len() as u32;
+                let brute: Vec<u32> =
+                    indices.filter(|&thing| around(&places, thing).touches(&wanted)).collect();
                 assert_eq!(found, brute);
             }
             places.iter_mut().for_each(|place| *place += 0.1 * point());

@@ -81,10 +81,10 @@ impl Pairs {
 
     /// Adds the pairs of the next first number: second numbers in any order, with bounds [m] from below of
     /// their distances.
-    fn add(&mut self, own: &mut Vec<(u32, f64)>) {
-        own.sort_unstable_by_key(|pair| pair.0);
-        self.second.extend(own.iter().map(|pair| pair.0));
-        self.distance.extend(own.drain(..).map(|pair| (pair.1 * (1.0 - SINGLE)) as f32));
+    fn add(&mut self, partners: &mut Vec<(u32, f64)>) {
+        partners.sort_unstable_by_key(|pair| pair.0);
+        self.second.extend(partners.iter().map(|pair| pair.0));
+        self.distance.extend(partners.drain(..).map(|pair| (pair.1 * (1.0 - SINGLE)) as f32));
         self.ends.push(self.second.len() as u32);
     }
 
@@ -113,7 +113,7 @@ impl Pairs {
     }
 
     /// Returns all pairs.
-    fn all(&self) -> impl Iterator<Item = [u32; 2]> {
+    fn listed(&self) -> impl Iterator<Item = [u32; 2]> {
         let starts = std::iter::once(&0).chain(&self.ends);
         let ranges = starts.zip(&self.ends).map(|(&from, &end)| from as usize..end as usize);
         ranges
@@ -215,12 +215,12 @@ impl BroadPhase {
     ) -> [Vec<[u32; 2]>; 2] {
         self.skin.fill(0.0);
         self.find(sides, &Default::default(), place, within);
-        let near = |sort: Sort, own: &Pairs| {
+        let near = |sort: Sort, pairs: &Pairs| {
             let distance = |numbers: &[u32; 2]| {
                 let points = sort.nodes(sides, *numbers).map(|node| place[node as usize]);
                 sort.kind().nearest(&points).distance < within
             };
-            own.all().filter(distance).collect()
+            pairs.listed().filter(distance).collect()
         };
         let found = [near(Sort::Point(0), &self.pairs[0]), near(Sort::Edges, &self.pairs[2])];
         self.place.clear();
@@ -242,9 +242,9 @@ impl BroadPhase {
     ) {
         if !self.holds(sides, place, skin, within) {
             for &node in sides.iter().flat_map(|side| &side.points) {
-                let (own, wide) = (skin[node as usize], &mut self.skin[node as usize]);
-                *wide = (WIDER * own).min(own + MORE * barrier).max(LEAST * barrier).max(KEPT * *wide);
-                self.reach[node as usize] = own;
+                let (narrow, wide) = (skin[node as usize], &mut self.skin[node as usize]);
+                *wide = (WIDER * narrow).min(narrow + MORE * barrier).max(LEAST * barrier).max(KEPT * *wide);
+                self.reach[node as usize] = narrow;
             }
             self.find(sides, apart, place, within);
         }
@@ -252,9 +252,9 @@ impl BroadPhase {
         self.skins.take(sides, skin);
         // The same surface has one sort of points.
         let sorts = [Sort::Point(0), Sort::Point(sides.len() - 1), Sort::Edges];
-        for (own, sort) in self.pairs.iter().zip(sorts) {
+        for (pairs, sort) in self.pairs.iter().zip(sorts) {
             let [first, second] = self.skins.of(sort, sides.len());
-            own.within(within, self.reaches.of(sort, sides.len()), |numbers| {
+            pairs.within(within, self.reaches.of(sort, sides.len()), |numbers| {
                 let [a, b] = numbers.map(|number| number as usize);
                 found(sides, sort, numbers, within + first[a] + second[b]);
             });
@@ -291,7 +291,7 @@ impl BroadPhase {
         // Whole sides first: a tool that waits far away costs no more than their boxes.
         let whole = |side: &CollisionMesh| {
             let boxes = side.points.iter().map(|&node| around([node], &at, &margin));
-            boxes.reduce(|all, one| all.with(&one))
+            boxes.reduce(|grown, one| grown.with(&one))
         };
         if let [first, second] = sides
             && !whole(first).zip(whole(second)).is_some_and(|(first, second)| first.touches(&second))
@@ -314,7 +314,7 @@ impl BroadPhase {
         let margin = |node: u32| skin[node as usize] + 0.5 * *within;
         let against = other(sides, number);
         let [_, of_faces] = skins.of(Sort::Point(number), sides.len());
-        let (mut met, mut own) = (Vec::new(), Vec::new());
+        let (mut met, mut partners) = (Vec::new(), Vec::new());
         for (&node, point) in sides[number].points.iter().zip(0..) {
             let wanted = around([node], &at, &margin);
             met.clear();
@@ -335,10 +335,10 @@ impl BroadPhase {
                 let [b, c, d] = corners.map(|node| &place[node as usize]);
                 let points = [&place[node as usize], b, c, d];
                 if !Kind::PointTriangle.is_beyond(points, limit * (1.0 + ROUND_OFF)) {
-                    own.push((face, Kind::PointTriangle.bound(points)));
+                    partners.push((face, Kind::PointTriangle.bound(points)));
                 }
             }
-            pairs[number].add(&mut own);
+            pairs[number].add(&mut partners);
         }
     }
 
@@ -347,7 +347,7 @@ impl BroadPhase {
         let Self { pairs, place, within, left_out, skins, .. } = self;
         let (side, against) = (&sides[0], other(sides, 0));
         let [own_skins, of_others] = skins.of(Sort::Edges, sides.len());
-        let (mut met, mut own) = (Vec::new(), Vec::new());
+        let (mut met, mut partners) = (Vec::new(), Vec::new());
         for (edge, number) in side.edges.iter().zip(0..) {
             let wanted = side.edge_boxes[number as usize];
             met.clear();
@@ -369,10 +369,10 @@ impl BroadPhase {
                 let limit = *within + own_skins[number as usize] + of_others[second as usize];
                 let points = [edge[0], edge[1], ends[0], ends[1]].map(|node| &place[node as usize]);
                 if !Kind::EdgeEdge.is_beyond(points, limit * (1.0 + ROUND_OFF)) {
-                    own.push((second, Kind::EdgeEdge.bound(points)));
+                    partners.push((second, Kind::EdgeEdge.bound(points)));
                 }
             }
-            pairs[2].add(&mut own);
+            pairs[2].add(&mut partners);
         }
     }
 }

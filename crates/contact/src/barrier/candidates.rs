@@ -261,10 +261,10 @@ impl Group {
                     Sort::Point(side) => (0.25 * sides[side].point_areas[first], 0.0),
                     Sort::Edges => {
                         let (side, against) = (&sides[0], other(sides, 0));
-                        let own = side.edge_areas[first];
+                        let first_area = side.edge_areas[first];
                         let area = match against.is_rigid {
-                            true => own,
-                            false => 0.25 * (own + against.edge_areas[second]),
+                            true => first_area,
+                            false => 0.25 * (first_area + against.edge_areas[second]),
                         };
                         (area, Mollifier::threshold([side.squares[first], against.squares[second]]))
                     }
@@ -366,9 +366,9 @@ impl Group {
         let gone = if squared > 0.0 { (along / squared).clamp(0.0, 1.0) } else { 0.0 };
         let mut holds = true;
         for &node in nodes() {
-            let own = (way(node) - common - self.course[node as usize] * gone).norm();
-            off(node, own);
-            holds &= own <= self.skin[node as usize];
+            let remaining = (way(node) - common - self.course[node as usize] * gone).norm();
+            off(node, remaining);
+            holds &= remaining <= self.skin[node as usize];
         }
         (gone, holds)
     }

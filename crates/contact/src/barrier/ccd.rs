@@ -148,8 +148,8 @@ mod tests {
     use serde_json::Value;
 
     fn four(of: &Value) -> [Vector3<f64>; 4] {
-        let all = of.as_array().unwrap();
-        std::array::from_fn(|i| Vector3::from_fn(|c, _| all[i][c].as_f64().unwrap()))
+        let rows = of.as_array().unwrap();
+        std::array::from_fn(|i| Vector3::from_fn(|c, _| rows[i][c].as_f64().unwrap()))
     }
 
     /// The 100 motions of the reference: no hit is missed and no time is later than the exact one. Where a

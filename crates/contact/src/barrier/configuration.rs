@@ -29,8 +29,8 @@ impl Configuration {
     /// Takes the places [m] of the nodes of the model. Nodes of rigid things, each a thing and a place [m] in
     /// its frame, follow their things.
     pub(crate) fn place_nodes(&mut self, position: &[Vector3<f64>], rigid_nodes: &[(u32, Vector3<f64>)]) {
-        let (own, others) = self.place.split_at_mut(position.len());
-        own.copy_from_slice(position);
+        let (of_model, others) = self.place.split_at_mut(position.len());
+        of_model.copy_from_slice(position);
         for (place, (thing, x)) in others.iter_mut().zip(rigid_nodes) {
             *place = (self.stances[*thing as usize].pose * Point3::from(*x)).coords;
         }

@@ -208,8 +208,8 @@ mod tests {
                 2 => points[3] = points[2],
                 _ => {}
             }
-            let (own, wanted) = (edge_distance(&points), edge_edge(&points).distance);
-            assert!((own - wanted).abs() < 1e-9 * wanted + ROUNDING, "{number}: {own} {wanted}");
+            let (found, wanted) = (edge_distance(&points), edge_edge(&points).distance);
+            assert!((found - wanted).abs() < 1e-9 * wanted + ROUNDING, "{number}: {found} {wanted}");
         }
     }
 
@@ -219,22 +219,23 @@ mod tests {
     }
 
     fn points(case: &Value) -> [Vector3<f64>; 4] {
-        let all = case["points"].as_array().unwrap();
-        std::array::from_fn(|i| Vector3::from_fn(|c, _| all[i][c].as_f64().unwrap()))
+        let rows = case["points"].as_array().unwrap();
+        std::array::from_fn(|i| Vector3::from_fn(|c, _| rows[i][c].as_f64().unwrap()))
     }
 
     fn vectors(of: &Value) -> [Vector3<f64>; 4] {
-        let all = of.as_array().unwrap();
-        std::array::from_fn(|i| Vector3::from_fn(|c, _| all[3 * i + c].as_f64().unwrap()))
+        let numbers = of.as_array().unwrap();
+        std::array::from_fn(|i| Vector3::from_fn(|c, _| numbers[3 * i + c].as_f64().unwrap()))
     }
 
     /// Rounding error of a distance from differences of coordinates up to 2: two units in the last place.
     const ROUNDING: f64 = 2.0 * f64::EPSILON;
 
     /// The largest difference of vectors, over the largest component of the second.
-    fn off(own: [Vector3<f64>; 4], wanted: [Vector3<f64>; 4]) -> f64 {
+    fn off(found: [Vector3<f64>; 4], wanted: [Vector3<f64>; 4]) -> f64 {
         let size = wanted.iter().map(|v| v.amax()).fold(0.0, f64::max);
-        own.iter().zip(&wanted).map(|(a, b)| (a - b).amax()).fold(0.0, f64::max) / size.max(f64::MIN_POSITIVE)
+        found.iter().zip(&wanted).map(|(a, b)| (a - b).amax()).fold(0.0, f64::max)
+            / size.max(f64::MIN_POSITIVE)
     }
 
     fn threshold([a, b, c, d]: &[Vector3<f64>; 4]) -> f64 {
@@ -261,14 +262,14 @@ mod tests {
             missed += u32::from(off_by >= 1e-12 * distance);
             let region = case["region"].as_str().unwrap();
             let of = [(Region::Face, "face"), (Region::Edge, "edge"), (Region::Point, "vertex")];
-            let (_, word) = of.iter().find(|(own, _)| *own == near.region).unwrap();
+            let (_, word) = of.iter().find(|(known, _)| *known == near.region).unwrap();
             assert!(region.starts_with(word), "{name}: {region} {:?}", near.region);
             assert!(off(gradient(&near), vectors(&case["grad_distance"])) < 1e-9, "{name}");
             let barrier = Barrier { distance: case["dhat"].as_f64().unwrap() };
             let slope = barrier.slope(near.distance);
-            let own = gradient(&near).map(|g| g * slope);
+            let barrier_gradient = gradient(&near).map(|g| g * slope);
             if distance < barrier.distance {
-                assert!(off(own, vectors(&case["grad_barrier"])) < 1e-9, "{name}");
+                assert!(off(barrier_gradient, vectors(&case["grad_barrier"])) < 1e-9, "{name}");
             }
         }
         println!(
@@ -307,8 +308,8 @@ mod tests {
             if distance < barrier.distance {
                 let [b, slope] = [barrier.energy(near.distance), barrier.slope(near.distance)];
                 let whole = gradient(&near).map(|g| g * (slope * mollifier.value));
-                let own = std::array::from_fn(|i| whole[i] + mollifier.gradient[i] * b);
-                assert!(off(own, vectors(&case["grad_mollified_barrier"])) < 1e-9, "{name}");
+                let mollified = std::array::from_fn(|i| whole[i] + mollifier.gradient[i] * b);
+                assert!(off(mollified, vectors(&case["grad_mollified_barrier"])) < 1e-9, "{name}");
             }
         }
         println!(
@@ -398,8 +399,8 @@ mod tests {
                 };
                 least = least.min(way.norm());
             }
-            let own = if number % 2 == 0 { edge_edge(&x) } else { point_triangle(&x) }.distance;
-            assert!(own <= least + 1e-14 && own > least - 0.1, "{own} {least}");
+            let found = if number % 2 == 0 { edge_edge(&x) } else { point_triangle(&x) }.distance;
+            assert!(found <= least + 1e-14 && found > least - 0.1, "{found} {least}");
         }
     }
 }

@@ -46,11 +46,11 @@ impl Features {
         // Corners that stand for one place are one.
         let bits = |x: &Vector3<f64>| [x.x, x.y, x.z].map(|c| (c + 0.0).to_bits());
         let mut first = BTreeMap::new();
-        let own: Vec<u32> =
+        let merged: Vec<u32> =
             points.iter().zip(0..).map(|(x, number)| *first.entry(bits(x)).or_insert(number)).collect();
         let mut sides = BTreeMap::<[u32; 2], Vec<Vector3<f64>>>::new();
         for corners in triangles {
-            let nodes = corners.map(|corner| own[corner as usize]);
+            let nodes = corners.map(|corner| merged[corner as usize]);
             let [a, b, c] = nodes.map(|node| points[node as usize]);
             let Some(normal) = (b - a).cross(&(c - a)).try_normalize(0.0) else { continue };
             for [from, to] in [[0, 1], [1, 2], [2, 0]].map(|ends| ends.map(|k: usize| nodes[k])) {
@@ -84,8 +84,8 @@ mod tests {
     #[test]
     fn features_are_corners_and_sharp_edges() {
         let count = |shape: Shape| {
-            let all = Features::of(&shape);
-            [all.points.len(), all.edges.len()]
+            let features = Features::of(&shape);
+            [features.points.len(), features.edges.len()]
         };
         assert_eq!(count(Shape::Sphere { radius: 1.0 }), [1, 0]);
         assert_eq!(count(Shape::Capsule { radius: 1.0, length: 2.0 }), [2, 1]);

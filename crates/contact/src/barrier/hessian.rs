@@ -153,7 +153,7 @@ impl Mollifier {
         }
         // Of |e₁ × e₂|² = |e₁|² |e₂|² − (e₁·e₂)².
         let flat = |e: &Vector3<f64>| (Matrix3::identity() * e.norm_squared() - e * e.transpose()) * 2.0;
-        let (own, other) = (flat(&second), flat(&first));
+        let (of_first, other) = (flat(&second), flat(&first));
         let both = first * second.transpose() * 4.0
             - second * first.transpose() * 2.0
             - Matrix3::identity() * (2.0 * first.dot(&second));
@@ -163,7 +163,7 @@ impl Mollifier {
             let (row, column) = (i / 3, j / 3);
             let at = (i % 3, j % 3);
             let part = match (row < 2, column < 2) {
-                (true, true) => own[at],
+                (true, true) => of_first[at],
                 (false, false) => other[at],
                 (true, false) => both[at],
                 (false, true) => both[(at.1, at.0)],
@@ -256,7 +256,7 @@ mod tests {
             let along = spread(&near.coefficients, &near.normal);
             let along = along * along.transpose() * curvature;
             let with = Mollified { threshold: rest, gradient: mollifier.gradient, energy, force };
-            let (own, wanted, case) = match mollifier.value {
+            let (found, wanted, case) = match mollifier.value {
                 1.0 => (
                     along + bent(&points, &near) * force,
                     along + positive(&(whole - along)),
@@ -265,8 +265,8 @@ mod tests {
                 _ => (of_parallel(&points, &near, curvature, &with), positive(&whole), 4),
             };
             counts[case] += 1;
-            worst[case] = worst[case].max((own - wanted).amax() / whole.amax());
-            let least = own.symmetric_eigenvalues().min() / own.amax();
+            worst[case] = worst[case].max((found - wanted).amax() / whole.amax());
+            let least = found.symmetric_eigenvalues().min() / found.amax();
             assert!(least > -1e-12, "{number} {case}: {least:e}, {} {:?}", near.distance, near.region);
         }
         println!("{counts:?} pairs of each kind, off by {worst:?} of the largest entry");

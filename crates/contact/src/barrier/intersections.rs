@@ -39,19 +39,19 @@ impl IntersectionCheck {
     /// A check of the contacts of bodies, except those with nodes that another solver moves. Nodes are at
     /// rest at some places [m].
     pub fn new(contacts: &Contacts, rest: &[[f64; 3]]) -> Self {
-        let own = |node: &u32| (*node as usize) < rest.len();
+        let belongs = |node: &u32| (*node as usize) < rest.len();
         let place = |node: u32| Vector3::from(rest[node as usize]);
         let of_bodies = contacts.contacts.iter().enumerate().filter(|(_, contact)| {
             !matches!(contact.with, With::Rigid(_))
-                && contact.surfaces().all(|surface| surface.nodes.iter().all(own))
+                && contact.surfaces().all(|surface| surface.nodes.iter().all(belongs))
         });
         let checked = of_bodies.map(|(number, contact)| {
             let sides = contact.surfaces().map(|surface| CollisionMesh::of_body(surface, place));
             let sides: Vec<CollisionMesh> = sides.collect();
             let count = |side: &CollisionMesh| side.edges.len() as f64;
             let length: f64 = sides.iter().map(|side| side.mean_edge(place) * count(side)).sum();
-            let all: f64 = sides.iter().map(count).sum();
-            (number, sides, SLIGHT * length / all.max(1.0))
+            let edge_count: f64 = sides.iter().map(count).sum();
+            (number, sides, SLIGHT * length / edge_count.max(1.0))
         });
         Self { contacts: checked.collect() }
     }

@@ -77,9 +77,9 @@ mod tests {
         serde_json::from_str(text).unwrap()
     }
 
-    fn close(own: f64, wanted: &Value, tolerance: f64) -> bool {
+    fn close(found: f64, wanted: &Value, tolerance: f64) -> bool {
         let wanted = wanted.as_f64().unwrap();
-        (own - wanted).abs() <= tolerance * wanted.abs().max(f64::MIN_POSITIVE)
+        (found - wanted).abs() <= tolerance * wanted.abs().max(f64::MIN_POSITIVE)
     }
 
     #[test]

@@ -31,7 +31,7 @@ impl BarrierStep {
         before: &[NodeTouch],
         share: impl Fn(u32, &mut dyn FnMut(u32, f64)),
     ) -> Vec<NodeTouch> {
-        let mut all: BTreeMap<u32, (f64, Vector3<f64>, [f64; 2])> = BTreeMap::new();
+        let mut sums: BTreeMap<u32, (f64, Vector3<f64>, [f64; 2])> = BTreeMap::new();
         for collision in self.normal_collisions() {
             let way = self.way(&collision.stencil);
             let (normal, _) = collision.pushes();
@@ -42,16 +42,16 @@ impl BarrierStep {
                 }
                 let push = collision.force_on(at);
                 share(node, &mut |node, part| {
-                    let own = all.entry(node).or_insert((f64::INFINITY, Vector3::zeros(), [0.0; 2]));
+                    let sum = sums.entry(node).or_insert((f64::INFINITY, Vector3::zeros(), [0.0; 2]));
                     let load = part * c.abs() * collision.force;
-                    own.0 = own.0.min(collision.gap);
-                    own.1 += push * part;
-                    own.2 = [own.2[0] + load, own.2[1] + load * slip];
+                    sum.0 = sum.0.min(collision.gap);
+                    sum.1 += push * part;
+                    sum.2 = [sum.2[0] + load, sum.2[1] + load * slip];
                 });
             }
         }
         let slid = |node: u32| {
-            let found = before.binary_search_by_key(&node, |own| own.node);
+            let found = before.binary_search_by_key(&node, |known| known.node);
             found.map_or(0.0, |at| before[at].slip)
         };
         let touch = |(node, (gap, push, [load, slips])): (u32, (f64, Vector3<f64>, [f64; 2]))| NodeTouch {
@@ -60,6 +60,6 @@ impl BarrierStep {
             push: push.into(),
             slip: slid(node) + if load > 0.0 { slips / load } else { 0.0 },
         };
-        all.into_iter().map(touch).collect()
+        sums.into_iter().map(touch).collect()
     }
 }

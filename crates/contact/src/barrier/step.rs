@@ -55,24 +55,26 @@ impl Barriers {
         let none = vec![0.0; 6 * self.nodes];
         let step = self.begin(position, &none, [time; 2]);
         let Self { groups, nodes, wall_distances, .. } = &step.barriers;
-        let mut all = Vec::new();
+        let mut meetings = Vec::new();
         let of = |contact: u32, at: &[u32], gap: Option<f64>| {
             let node = at.iter().copied().find(|node| (*node as usize) < *nodes)?;
             Some(Meeting { contact, node, place: position[node as usize].into(), gap })
         };
         for (group, distances) in groups.iter().zip(wall_distances) {
-            group.too_close(&step.now.place, |at, gap| all.extend(of(group.number, &at, Some(gap))));
+            group.too_close(&step.now.place, |at, gap| meetings.extend(of(group.number, &at, Some(gap))));
             if group.wall.is_some() {
                 let distances = group.sides[0].points.iter().zip(distances);
                 let gaps = distances.map(|(&node, distance)| (node, distance - group.parameters.kept));
-                all.extend(
+                meetings.extend(
                     gaps.filter(|(_, gap)| *gap <= 0.0)
                         .filter_map(|(node, gap)| of(group.number, &[node], Some(gap))),
                 );
             }
         }
-        step.intersections(|contact, ends, corners| all.extend(of(contact, &[ends[0], corners[0]], None)));
-        all
+        step.intersections(|contact, ends, corners| {
+            meetings.extend(of(contact, &[ends[0], corners[0]], None))
+        });
+        meetings
     }
 }
 
@@ -264,8 +266,8 @@ impl BarrierStep {
             } else if stencil.is_second(at) {
                 *total += force;
             }
-            if let Some(own) = forces.get_mut(6 * node as usize..6 * node as usize + 3) {
-                own.iter_mut().zip(force.iter()).for_each(|(own, force)| *own += force);
+            if let Some(sums) = forces.get_mut(6 * node as usize..6 * node as usize + 3) {
+                sums.iter_mut().zip(force.iter()).for_each(|(sum, force)| *sum += force);
             }
         });
     }
@@ -308,7 +310,7 @@ impl BarrierStep {
             .chain(self.friction_collisions.iter().map(|collision| &collision.stencil));
         stencils
             .filter(|stencil| stencil.count > 1)
-            .for_each(|stencil| found(&self.barriers.own(&stencil.nodes)));
+            .for_each(|stencil| found(&self.barriers.nodes_of_model(&stencil.nodes)));
     }
 
     /// Calls back with the nodes of the model of each pair that may act soon. Such a pair is within the reach
@@ -320,7 +322,7 @@ impl BarrierStep {
         barriers.relist(now);
         for group in &barriers.groups {
             let margin = distances * group.parameters.law.distance;
-            group.pairs(&now.place, margin, |nodes| found(&barriers.own(nodes)));
+            group.pairs(&now.place, margin, |nodes| found(&barriers.nodes_of_model(nodes)));
         }
     }
 

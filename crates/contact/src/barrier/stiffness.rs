@@ -31,10 +31,10 @@ impl BarrierStep {
             }
             // The rest of the rise counts as a way of all nodes of the thing, along the normal by which their
             // distance falls.
-            let own = |node: u32| self.barriers.rigid_node(node);
-            let sum: f64 = stencil.parts().filter_map(|(node, c)| own(node).map(|_| c)).sum();
+            let rigid_node = |node: u32| self.barriers.rigid_node(node);
+            let sum: f64 = stencil.parts().filter_map(|(node, c)| rigid_node(node).map(|_| c)).sum();
             for (way, (node, _)) in ways.iter_mut().zip(stencil.parts()) {
-                if let Some((thing, x)) = own(node) {
+                if let Some((thing, x)) = rigid_node(node) {
                     let target = (to[*thing as usize].pose * Point3::from(*x)).coords;
                     *way = target - self.now.place[node as usize] - outward * (rises(*thing) * sum);
                 }

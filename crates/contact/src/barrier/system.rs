@@ -83,16 +83,16 @@ impl Barriers {
         let at = |node: u32| places[node as usize];
         let mut groups = Vec::new();
         for ((contact, settings), number) in contacts.contacts.iter().zip(settings).zip(0..) {
-            let own = CollisionMesh::of_body(&contact.surface, at);
+            let mesh = CollisionMesh::of_body(&contact.surface, at);
             let mut offset = contact.touch.offset;
             let (sides, wall, thing) = match &contact.with {
-                With::Itself => (vec![own], None, None),
-                With::Body(other) => (vec![own, CollisionMesh::of_body(other, at)], None, None),
+                With::Itself => (vec![mesh], None, None),
+                With::Body(other) => (vec![mesh, CollisionMesh::of_body(other, at)], None, None),
                 With::Rigid(rigid) => {
                     let (features, first) = &features[*rigid];
                     offset += features.offset;
                     let wall = (!features.is_all).then_some(*rigid as u32);
-                    (vec![own, CollisionMesh::of_rigid(features, *first)], wall, Some(*rigid as u32))
+                    (vec![mesh, CollisionMesh::of_rigid(features, *first)], wall, Some(*rigid as u32))
                 }
             };
             let parameters = ContactParameters {
@@ -141,8 +141,8 @@ impl Barriers {
         [from, to]: &[Vec<Stance>; 2],
         time_fraction: f64,
     ) {
-        for (own, way) in self.motion.iter_mut().zip(motion.chunks_exact(6)) {
-            *own = Vector3::new(way[0], way[1], way[2]) * part;
+        for (moved, way) in self.motion.iter_mut().zip(motion.chunks_exact(6)) {
+            *moved = Vector3::new(way[0], way[1], way[2]) * part;
         }
         let then = |thing: u32| Stance::between([&from[thing as usize], &to[thing as usize]], time_fraction);
         for (node, (thing, x)) in (self.nodes..).zip(&self.rigid_nodes) {
@@ -198,7 +198,7 @@ impl Barriers {
     /// Returns the way [m] that a rigid thing has gone since pairs were listed.
     pub(super) fn travel(&self, wall: u32, now: &Configuration) -> f64 {
         let rigid = &self.contacts.rigids[wall as usize];
-        let [then, now] = [&self.listed, now].map(|own| own.stances[wall as usize]);
+        let [then, now] = [&self.listed, now].map(|configuration| configuration.stances[wall as usize]);
         if then == now { 0.0 } else { Passage::new(rigid, [then, now]).travel_from(rigid, &then) }
     }
 
@@ -262,7 +262,7 @@ impl Barriers {
     }
 
     /// Returns the nodes that belong to the model.
-    pub(super) fn own(&self, nodes: &[u32]) -> Vec<u32> {
+    pub(super) fn nodes_of_model(&self, nodes: &[u32]) -> Vec<u32> {
         nodes.iter().copied().filter(|&node| (node as usize) < self.nodes).collect()
     }
 }

@@ -52,16 +52,16 @@ impl Scene {
             above.iter().map(|x| x + Vector3::new(0.03, 0.02, 0.02) + 0.004 * Vector3::from(random.vector())),
         );
         let touch = Touch { friction, offset: 0.005 };
-        let own = |name: &str, surface: &Surface, with: With| Contact {
+        let contact = |name: &str, surface: &Surface, with: With| Contact {
             name: name.into(),
             surface: surface.clone(),
             with,
             touch,
         };
         let contacts = vec![
-            own("sheets", &low, With::Body(high.clone())),
-            own("itself", &high, With::Itself),
-            own("thing", &low, With::Rigid(0)),
+            contact("sheets", &low, With::Body(high.clone())),
+            contact("itself", &high, With::Itself),
+            contact("thing", &low, With::Rigid(0)),
         ];
         let settings = BarrierSettings { distance: 0.015, stiffness: 1e4, creep_speed: 1e-3 };
         let rest: Vec<[f64; 3]> = places.iter().map(|&x| x.into()).collect();
@@ -94,11 +94,11 @@ fn things() -> Vec<Rigid> {
 /// Things that stay where they are and grow by a distance [m].
 fn growing(by: f64) -> Vec<Rigid> {
     let curve = Curve { shape: CurveShape::Ramp, from: 0.0, to: 1.0 };
-    let all = things().into_iter().map(|thing| {
+    let rigids = things().into_iter().map(|thing| {
         let trajectory = Trajectory::fixed(thing.at(0.0, None)).growing(by, curve.clone());
         Rigid { trajectory, ..thing }
     });
-    all.collect()
+    rigids.collect()
 }
 
 /// Forces are minus the gradient of the energy of barriers and friction together. Forces of a contact between
@@ -137,8 +137,8 @@ fn forces_are_gradients_and_balance() {
                 scene.step.evaluate(&moved, time_fraction)
             };
             let slope = (at(h) - at(-h)) / (2.0 * h);
-            let own = -forces[6 * node + c];
-            assert!((slope - own).abs() < 1e-5 * size, "{shape} {node} {c}: {own} {slope}, {size}");
+            let expected = -forces[6 * node + c];
+            assert!((slope - expected).abs() < 1e-5 * size, "{shape} {node} {c}: {expected} {slope}, {size}");
         }
         let sum: Vector3<f64> = forces.chunks_exact(6).map(|f| Vector3::new(f[0], f[1], f[2])).sum();
         assert!((sum + totals[2]).norm() < 1e-10 * size, "{shape}: {sum} {}", totals[2]);
@@ -283,14 +283,14 @@ fn what_grows_presses_like_what_is_larger() {
             scene.step.add_forces(&mut forces, &mut totals);
             (forces, totals[2], scene)
         };
-        let (own, total, _) = forces(grown.clone(), 1.0);
+        let (grown_forces, total, _) = forces(grown.clone(), 1.0);
         let (wanted, same, _) = forces(rigid(larger, at, [0.0; 3]), 1.0);
         let size = wanted.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
-        let off = own.iter().zip(&wanted).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let off = grown_forces.iter().zip(&wanted).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(off < 1e-11 * size && (total - same).norm() < 1e-11 * size && total.norm() > 0.0, "{off:e}");
         // Forces fall by the stiffness times the way that is left: by differences over the fraction of time.
         let (_, _, scene) = forces(grown.clone(), 0.5);
-        let mut slope = vec![0.0; own.len()];
+        let mut slope = vec![0.0; grown_forces.len()];
         scene.step.stiffness(|stencil: &Stencil, block, ways| {
             let way = nalgebra::SVector::<f64, 12>::from_fn(|k, _| ways[k / 3][k % 3]);
             let pull = block * way;

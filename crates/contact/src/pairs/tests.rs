@@ -14,9 +14,9 @@ fn square(cells: u32, up: bool, first: u32) -> (Surface, Vec<Vector3<f64>>) {
 }
 
 fn found(pairs: &Pairs, places: &[Vector3<f64>]) -> Vec<Pair> {
-    let mut all = Vec::new();
-    pairs.find(|node| places[node as usize], |pair| all.push(pair));
-    all
+    let mut collected = Vec::new();
+    pairs.find(|node| places[node as usize], |pair| collected.push(pair));
+    collected
 }
 
 /// Two sheets that face each other, shifted. Distances and normals are the values of the planes, and weights
@@ -31,11 +31,11 @@ fn sheets_that_face_each_other_are_seen_with_their_distance() {
     for height in [0.1, 0.05, -0.02] {
         places[16..].iter_mut().for_each(|place| place.z = height);
         pairs.update(|node| places[node as usize]);
-        let all = found(&pairs, &places);
+        let touching = found(&pairs, &places);
         let [points, edges] =
-            [true, false].map(|of| all.iter().filter(|p| (p.weights[0] == 1.0) == of).count());
+            [true, false].map(|of| touching.iter().filter(|p| (p.weights[0] == 1.0) == of).count());
         assert!(points >= 18 && edges >= 10, "{points} {edges}");
-        for pair in all {
+        for pair in touching {
             // The pair of a node outside a border has its distance from the border.
             if pair.normal.z.abs() < 0.9 {
                 assert!(pair.distance > 0.19, "{pair:?}");
@@ -71,9 +71,10 @@ fn what_is_nearer_at_the_start_keeps_that_distance() {
     assert!(near.iter().all(|(_, kept)| (0.0..0.2).contains(kept)), "{near:?}");
     let mut pairs = fresh().keeping(near, place);
     pairs.update(place);
-    let all = found(&pairs, &places);
-    assert!(all.iter().all(|pair| pair.distance > pair.kept - 1e-12), "{all:?}");
-    let [whole, part] = [true, false].map(|whole| all.iter().filter(|p| (p.kept == 0.2) == whole).count());
+    let touching = found(&pairs, &places);
+    assert!(touching.iter().all(|pair| pair.distance > pair.kept - 1e-12), "{touching:?}");
+    let [whole, part] =
+        [true, false].map(|whole| touching.iter().filter(|p| (p.kept == 0.2) == whole).count());
     assert!(whole > 3 && part > 10, "{whole} {part}");
     // The distance that is kept changes evenly along triangles: a sheet that slides is not pushed at once.
     let (mut before, mut least): (Option<f64>, f64) = (None, f64::INFINITY);
@@ -111,7 +112,7 @@ fn pairs_do_not_depend_on_when_lists_are_made() {
         let fresh = || Pairs::new(first, second, 0.01, apart);
         let (mut held, mut wide) = (fresh(), fresh());
         wide.skin *= 4.0;
-        let (mut lists, mut all) = (0, 0);
+        let (mut lists, mut pair_count) = (0, 0);
         for step in 0..300 {
             let time = 0.01 * f64::from(step);
             let wave = |x: &Vector3<f64>| {
@@ -138,10 +139,10 @@ fn pairs_do_not_depend_on_when_lists_are_made() {
             let wanted = bits(&anew);
             assert_eq!(bits(&held), wanted, "step {step}");
             assert_eq!(bits(&wide), wanted, "step {step}");
-            all += wanted.len();
+            pair_count += wanted.len();
         }
-        println!("{all} pairs in 300 steps, listed anew in {lists}");
-        assert!(all > 3000 && lists < 150, "{all} {lists}");
+        println!("{pair_count} pairs in 300 steps, listed anew in {lists}");
+        assert!(pair_count > 3000 && lists < 150, "{pair_count} {lists}");
     }
 }
 
@@ -163,8 +164,8 @@ fn walls_in_one_plane_do_not_touch() {
         places[6..].iter_mut().for_each(|place| *place += Vector3::new(shift, 0.0, height));
         let mut pairs = Pairs::new(&block, Some(&corner), 1.0, |node| places[node as usize]);
         pairs.update(|node| places[node as usize]);
-        let all = found(&pairs, &places);
-        let of_corner: Vec<&Pair> = all.iter().filter(|pair| pair.nodes[0] == 6).collect();
+        let touching = found(&pairs, &places);
+        let of_corner: Vec<&Pair> = touching.iter().filter(|pair| pair.nodes[0] == 6).collect();
         assert!(!of_corner.is_empty());
         assert!(of_corner.iter().all(|pair| pair.normal.z > 0.99 && pair.distance > 0.0), "{of_corner:?}");
     }
@@ -185,10 +186,10 @@ fn a_folded_sheet_touches_itself_across_the_fold_only() {
     assert!(found(&pairs, &flat).is_empty());
     let folded: Vec<Vector3<f64>> = flat.iter().map(fold).collect();
     pairs.update(|node| folded[node as usize]);
-    let all = found(&pairs, &folded);
-    let across = all.iter().filter(|pair| (pair.distance - 0.1).abs() < 1e-12).count();
-    assert!(across > 40, "{across} of {}", all.len());
-    assert!(all.iter().all(|pair| pair.distance > 0.0));
+    let touching = found(&pairs, &folded);
+    let across = touching.iter().filter(|pair| (pair.distance - 0.1).abs() < 1e-12).count();
+    assert!(across > 40, "{across} of {}", touching.len());
+    assert!(touching.iter().all(|pair| pair.distance > 0.0));
     // Too near at rest: they never touch, or keep what they have.
     let place = |node: u32| folded[node as usize];
     let pairs = Pairs::new(&sheet, None, 0.2, place);
@@ -197,7 +198,7 @@ fn a_folded_sheet_touches_itself_across_the_fold_only() {
     let mut pairs = Pairs::new(&sheet, None, 0.2, place).keeping(near, place);
     assert_eq!(pairs.set_apart_count(), 0);
     pairs.update(place);
-    let all = found(&pairs, &folded);
-    assert!(all.iter().filter(|pair| (pair.kept - 0.1).abs() < 1e-12).count() > 40);
-    assert!(all.iter().all(|pair| pair.distance > pair.kept - 1e-12));
+    let touching = found(&pairs, &folded);
+    assert!(touching.iter().filter(|pair| (pair.kept - 0.1).abs() < 1e-12).count() > 40);
+    assert!(touching.iter().all(|pair| pair.distance > pair.kept - 1e-12));
 }
