@@ -81,11 +81,11 @@ fn about(cell: CellId, live: &Live, world: &World, on: Option<&str>, hidden: &[R
     let names = world.body_names(on);
     let body = on.or_else(|| names.get(&cell_body(block, cell.index)).map(String::as_str))?;
     // Cells are counted in the whole mesh, hidden ones included.
-    let own = block.cells().nth(cell.index as usize)?;
+    let corners = block.cells().nth(cell.index as usize)?;
     let element = live
         .shown()
         .block(cell.kind)
-        .and_then(|whole| CellBlock::cells(whole).position(|nodes| nodes == own));
+        .and_then(|whole| CellBlock::cells(whole).position(|nodes| nodes == corners));
     let element = element.map_or(String::new(), |element| format!(", element {element}"));
     let label = number("label").map_or(String::new(), |label| {
         let name = seen.label_names.get(&(label as i32)).map_or(String::new(), |name| format!(" ({name})"));

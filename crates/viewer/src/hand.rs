@@ -153,10 +153,10 @@ struct Taken {
 type Nodes = Vec<(u32, f64)>;
 
 fn add(nodes: &mut Nodes, more: Nodes, weight: f64) {
-    for (node, own) in more {
+    for (node, share) in more {
         match nodes.iter_mut().find(|(known, _)| *known == node) {
-            Some((_, sum)) => *sum += own * weight,
-            None => nodes.push((node, own * weight)),
+            Some((_, sum)) => *sum += share * weight,
+            None => nodes.push((node, share * weight)),
         }
     }
 }

@@ -8,7 +8,7 @@ use pliant_scene::World;
 
 /// The marks of all participants at the instant of a run.
 pub(crate) fn marks(world: &World, live: &Live) -> Vec<Mark> {
-    let (time, mut all) = (live.simulation.time(), Vec::new());
+    let (time, mut marks) = (live.simulation.time(), Vec::new());
     for (part, now) in world.participants.iter().zip(live.simulation.instants()) {
         let model = &part.built.model;
         let displacement: Vec<[f64; 3]> =
@@ -21,14 +21,14 @@ pub(crate) fn marks(world: &World, live: &Live) -> Vec<Mark> {
                 Motion::Mean { .. } => Marked::Plate,
                 _ => Marked::Moved,
             };
-            all.extend(constraint.nodes.iter().map(|&node| (place(node), marked)));
+            marks.extend(constraint.nodes.iter().map(|&node| (place(node), marked)));
         }
         let weights = (0..).zip(model.weights(time));
-        all.extend(weight_of(weights.map(|(node, weight)| (place(node), Vector3::from(weight)))));
+        marks.extend(weight_of(weights.map(|(node, weight)| (place(node), Vector3::from(weight)))));
         let forces = (0..).zip(part.built.load_forces(time, &displacement));
         let loaded = forces.map(|(node, force)| (node, Vector3::from(force)));
         let loaded = loaded.filter(|(_, force)| force.norm() > 0.0);
-        all.extend(loaded.map(|(node, force)| (place(node), Marked::Loaded(force))));
+        marks.extend(loaded.map(|(node, force)| (place(node), Marked::Loaded(force))));
     }
-    some_of(all)
+    some_of(marks)
 }

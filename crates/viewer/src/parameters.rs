@@ -75,7 +75,8 @@ fn collect(path: Vec<String>, node: &Node, described: Option<&Described>, found:
         }
         Value::Table(entries) => {
             for (key, part) in entries {
-                let described = described.and_then(|whole| whole.parts.iter().find(|own| own.key == *key));
+                let described =
+                    described.and_then(|whole| whole.parts.iter().find(|entry| entry.key == *key));
                 collect(within(key), part, described, found);
             }
             return;
@@ -83,7 +84,7 @@ fn collect(path: Vec<String>, node: &Node, described: Option<&Described>, found:
         _ => return,
     };
     let (unit, meaning) =
-        described.map(|own| (own.unit.clone(), own.description.clone())).unwrap_or_default();
+        described.map(|entry| (entry.unit.clone(), entry.description.clone())).unwrap_or_default();
     found.push(Parameter { number: Number { path, value }, unit, meaning });
 }
 
@@ -97,7 +98,7 @@ pub fn with_numbers(scene: &Scene, numbers: &[Number]) -> Result<World, String> 
         let path: Vec<&str> = path.iter().map(String::as_str).collect();
         source.set(&path, *value).map_err(|mistake| mistake.message.clone())?;
     }
-    let told = |errors: SceneErrors| errors.plain().to_string();
-    let scene = Scene::from_source(source, scene.folder.clone()).map_err(told)?;
-    World::assemble(&scene, &MeshCache::of_user(), &|_| {}).map_err(told)
+    let message = |errors: SceneErrors| errors.plain().to_string();
+    let scene = Scene::from_source(source, scene.folder.clone()).map_err(message)?;
+    World::assemble(&scene, &MeshCache::of_user(), &|_| {}).map_err(message)
 }

@@ -51,12 +51,12 @@ pub struct Lags {
 impl Lags {
     /// Returns the lags of a recording.
     pub fn of(recording: &Recording) -> Self {
-        let mut all: Vec<f64> = recording.moves.iter().filter_map(|then| then.lag).collect();
-        all.sort_by(f64::total_cmp);
-        let median = all.get(all.len() / 2).copied().unwrap_or_default();
-        let worst = all.last().copied().unwrap_or_default();
+        let mut lags: Vec<f64> = recording.moves.iter().filter_map(|then| then.lag).collect();
+        lags.sort_by(f64::total_cmp);
+        let median = lags.get(lags.len() / 2).copied().unwrap_or_default();
+        let worst = lags.last().copied().unwrap_or_default();
         let frames = |lag: f64| lag / FRAME.as_secs_f64();
-        Self { moves: all.len(), median, worst, median_frames: frames(median), worst_frames: frames(worst) }
+        Self { moves: lags.len(), median, worst, median_frames: frames(median), worst_frames: frames(worst) }
     }
 }
 

@@ -84,8 +84,8 @@ impl Until {
     /// The part of it that is done.
     fn part(&self, drags: u64, began: Instant) -> f64 {
         match self {
-            Self::Drags(all) => drags as f64 / *all as f64,
-            Self::Wall(all) => began.elapsed().as_secs_f64() / all.as_secs_f64(),
+            Self::Drags(count) => drags as f64 / *count as f64,
+            Self::Wall(duration) => began.elapsed().as_secs_f64() / duration.as_secs_f64(),
         }
     }
 }

@@ -470,14 +470,14 @@ fn numbers_that_cannot_be_are_refused_in_the_words_of_the_scene() {
     let world = calm();
     let refused = with_numbers(&world.scene, &[number("law.tissue.young-modulus", -1.0)]).unwrap_err();
     assert!(refused.contains("young-modulus") && refused.contains("-1"), "{refused}");
-    let all = parameters(&world.scene);
-    let paths: Vec<String> = all.iter().map(|parameter| parameter.number.path.join(".")).collect();
+    let numbers = parameters(&world.scene);
+    let paths: Vec<String> = numbers.iter().map(|parameter| parameter.number.path.join(".")).collect();
     assert_eq!(
         paths,
         ["law.tissue.young-modulus", "law.tissue.poisson-ratio", "body.ball.density", "body.ball.damping"]
     );
-    assert_eq!((all[0].number.value, all[0].unit.as_str()), (5e3, "Pa"));
-    assert!(all.iter().all(|parameter| !parameter.meaning.is_empty()));
+    assert_eq!((numbers[0].number.value, numbers[0].unit.as_str()), (5e3, "Pa"));
+    assert!(numbers.iter().all(|parameter| !parameter.meaning.is_empty()));
 }
 
 #[test]
@@ -548,8 +548,9 @@ fn samples_are_those_of_the_run_and_not_of_frames() {
             steps += stride;
             wait(&mut session, |frame| frame.steps == steps);
         }
-        let all: Vec<_> = session.samples().map(|sample| (sample.time.to_bits(), sample.values)).collect();
-        all
+        let samples: Vec<_> =
+            session.samples().map(|sample| (sample.time.to_bits(), sample.values)).collect();
+        samples
     };
     let [whole, parts] = [taken(&[700]), taken(&[350, 350])];
     assert!(whole.len() > 100 && whole.iter().all(|sample| parts.contains(sample)), "{}", whole.len());
@@ -748,7 +749,8 @@ fn two_hands_pull_each_on_its_own_and_are_repeated() {
     let [up, down] = Which::BOTH.map(|which| both.hand(which).unwrap()[1][1]);
     assert!(up > 0.0 && down < 0.0 && both.pins().len() == 1, "{up} N, {down} N");
     let sample = session.samples().last().unwrap();
-    let last = |name: &str| sample.values[sample.columns.iter().position(|own| own.name == name).unwrap()];
+    let last =
+        |name: &str| sample.values[sample.columns.iter().position(|column| column.name == name).unwrap()];
     assert_eq!([last("hand.y"), last("second-hand.y")], [up, down]);
     session.order(Order::Hand(Hand::Release));
     session.order(Order::Step(50));

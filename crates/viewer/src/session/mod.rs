@@ -187,14 +187,14 @@ pub(crate) fn enter(
     world: &World,
     from: Option<(World, Option<SimulationState>)>,
 ) -> Result<(Live, bool), String> {
-    let told = |failure: Failure| failure.message;
+    let message = |failure: Failure| failure.message;
     let world = Arc::new(world.clone());
     if let Some((before, Some(snapshot))) = from
-        && let Some(live) = Live::go_on(&world, snapshot, &before).map_err(told)?
+        && let Some(live) = Live::go_on(&world, snapshot, &before).map_err(message)?
     {
         return Ok((live, true));
     }
-    Ok((Live::new(&world).map_err(told)?, false))
+    Ok((Live::new(&world).map_err(message)?, false))
 }
 
 impl Session {

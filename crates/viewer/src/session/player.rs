@@ -564,7 +564,7 @@ impl<'s> Player<'s> {
         seen.held.extend(playback.hold.shown(&self.live));
         seen.hands = playback.hold.hands();
         seen.followed.clear();
-        seen.followed.extend(playback.followed.iter().map(|own| own.now(&self.live, &seen.values)));
+        seen.followed.extend(playback.followed.iter().map(|point| point.now(&self.live, &seen.values)));
         seen.marks = if playback.marked { marks(self.world, &self.live) } else { Vec::new() };
         seen.number += 1;
         seen.at = Some(Instant::now());

@@ -74,8 +74,9 @@ fn list(ui: &mut egui::Ui, names: &RegionNames, hide: &mut Vec<CellLabel>, looks
     }
     // Something has to be left to be seen.
     let left = |is_label: bool| {
-        let mut own = rows.iter().filter(|row| matches!(row.region, Region::Label(_)) == is_label).peekable();
-        own.peek().is_none() || own.any(|row| !hidden.contains(&row.region))
+        let mut of_kind =
+            rows.iter().filter(|row| matches!(row.region, Region::Label(_)) == is_label).peekable();
+        of_kind.peek().is_none() || of_kind.any(|row| !hidden.contains(&row.region))
     };
     let changed = hidden != before && left(true) && left(false);
     if changed {
@@ -96,8 +97,8 @@ fn regions_named(names: &RegionNames, name: &str) -> Vec<Region> {
 
 /// Gives a region a look, by the name that has given it one so far. A name of several labels is replaced by
 /// the numbers of the others.
-fn set_look(names: &RegionNames, looks: &mut Looks, region: Region, own: &CellLabel, look: LookTable) {
-    let mut key = own.to_string();
+fn set_look(names: &RegionNames, looks: &mut Looks, region: Region, label: &CellLabel, look: LookTable) {
+    let mut key = label.to_string();
     while let Some((name, shared)) = look_of(names, looks, region) {
         looks.remove(&name);
         let regions = regions_named(names, &name);

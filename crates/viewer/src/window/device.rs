@@ -35,8 +35,8 @@ pub(super) fn shared(state: &RenderState, world: &World) -> Option<Device> {
 impl App {
     /// The points of the newest frame, where they lie on the window's device.
     pub(super) fn on_device(&self) -> Option<&DevicePoints> {
-        let own = self.device.as_ref()?;
-        self.frame.on_device.as_ref().filter(|points| points.device().wgpu().0 == own.wgpu().0)
+        let device = self.device.as_ref()?;
+        self.frame.on_device.as_ref().filter(|points| points.device().wgpu().0 == device.wgpu().0)
     }
 
     /// Has every frame in ordinary memory while a section is shown, or where the device is not the window's.

@@ -47,12 +47,12 @@ impl App {
         let (send, receive) = channel();
         let (scene, context) = (self.file.clone(), self.context.clone());
         std::thread::spawn(move || {
-            let told = match write(&scene, &pictures, rate.clamp(1.0, 60.0)) {
+            let message = match write(&scene, &pictures, rate.clamp(1.0, 60.0)) {
                 Ok(path) => Told::done(format!("`{}` was written", path.display())),
                 Err(reason) => Told::failure(format!("no film was written: {reason}")),
             };
             // The window may be closed by now.
-            let _ = send.send(told);
+            let _ = send.send(message);
             context.request_repaint();
         });
         self.filming.written = Some(receive);
@@ -61,9 +61,9 @@ impl App {
 
     /// Takes the next picture of a film when it is due.
     pub(super) fn go_on_filming(&mut self) {
-        if let Some(told) = self.filming.written.as_ref().and_then(|written| written.try_recv().ok()) {
+        if let Some(message) = self.filming.written.as_ref().and_then(|written| written.try_recv().ok()) {
             self.filming.written = None;
-            self.message = Some(told);
+            self.message = Some(message);
         }
         let Filming { taking, since: Some([since, last]), pictures, .. } = &mut self.filming else { return };
         if let Some(picture) = taking.picture(&self.context, self.port.rect) {

@@ -41,9 +41,10 @@ pub struct FinishedRun {
 /// # Errors
 /// If it can't be opened, or the run has no such series.
 pub fn open_finished(run: FinishedRun) -> Result<Option<String>, WindowError> {
-    let told = |error: SeriesError| WindowError::Run { message: error.to_string(), remedy: error.remedy() };
-    let names = Series::names(&run.folder).map_err(told)?;
-    let series = Series::find(&run.folder, run.series.as_deref()).map_err(told)?;
+    let unreadable =
+        |error: SeriesError| WindowError::Run { message: error.to_string(), remedy: error.remedy() };
+    let names = Series::names(&run.folder).map_err(unreadable)?;
+    let series = Series::find(&run.folder, run.series.as_deref()).map_err(unreadable)?;
     run_window(WgpuConfiguration::default(), run.size, move |context, outcome| {
         Finished::new(context, run, names, series, outcome)
     })
@@ -92,12 +93,12 @@ fn survey(series: &Series, context: &egui::Context) -> Result<Receiver<Vec<Vecto
     let (send, receive) = channel();
     let (frames, context) = (series.frames.clone(), context.clone());
     let work = move || {
-        let mut all = Outermost::default();
+        let mut outermost = Outermost::default();
         // The message about an unreadable frame appears when it is shown.
         let meshes = frames.iter().filter_map(|(_, file)| pliant_geometry::io::read(file).ok());
-        meshes.for_each(|file| all.add(deformed_points(&file.mesh)));
+        meshes.for_each(|file| outermost.add(deformed_points(&file.mesh)));
         // Another series may be shown by now.
-        let _ = send.send(all.points().to_vec());
+        let _ = send.send(outermost.points().to_vec());
         context.request_repaint();
     };
     let thread = std::thread::Builder::new().name("survey".into()).spawn(work);
@@ -275,13 +276,13 @@ impl Finished {
         }
         let other = self.shown.as_ref().is_none_or(|shown| shown.field != loaded.asked.field);
         let unit = loaded.asked.field.as_deref().map_or("", |field| words(field).1);
-        let own = self.port.range_seen(unit);
+        let seen = self.port.range_seen(unit);
         if !self.port.locked {
             // The range grows over the frames that were seen, so that colours mean the same in each.
             let before = self.port.style.range.filter(|_| !other);
-            self.port.style.range = match (before, own) {
-                (Some([low, high]), Some(own)) => Some([low.min(own[0]), high.max(own[1])]),
-                (before, own) => own.or(before),
+            self.port.style.range = match (before, seen) {
+                (Some([low, high]), Some(seen)) => Some([low.min(seen[0]), high.max(seen[1])]),
+                (before, seen) => seen.or(before),
             };
         }
         self.choices = loaded.choices;
@@ -364,8 +365,8 @@ impl Finished {
         let word = |field: &Option<String>| field.as_deref().map_or("tissue".into(), |field| words(field).0);
         let selected = word(&self.field);
         egui::ComboBox::from_id_salt("field").selected_text(selected).width(180.0).show_ui(ui, |ui| {
-            let all = std::iter::once(None).chain(self.choices.iter().cloned().map(Some));
-            for other in all {
+            let choices = std::iter::once(None).chain(self.choices.iter().cloned().map(Some));
+            for other in choices {
                 let word = word(&other);
                 ui.selectable_value(&mut self.field, other, word);
             }
@@ -455,14 +456,14 @@ impl Finished {
             return;
         };
         context.request_repaint();
-        let failed = self.message.as_ref().map(|told| Err(told.text.clone()));
+        let failed = self.message.as_ref().map(|message| Err(message.text.clone()));
         let is_there = self.shown.is_some() && self.shown == self.asked && self.surveyed.is_none();
         self.posed += u32::from(is_there);
         if self.posed == 10 {
             self.taking.ask(context);
         }
-        let told = format!("{} at t = {:.3} s", self.run.folder.display(), self.timeline.at);
-        let taken = self.taking.write(file).map(|written| written.map(|()| told));
+        let message = format!("{} at t = {:.3} s", self.run.folder.display(), self.timeline.at);
+        let taken = self.taking.write(file).map(|written| written.map(|()| message));
         if let Some(outcome) = failed.or(taken) {
             *self.outcome.lock().unwrap_or_else(PoisonError::into_inner) = Some(outcome);
             context.send_viewport_cmd(egui::ViewportCommand::Close);

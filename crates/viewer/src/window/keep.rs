@@ -41,8 +41,8 @@ impl Taking {
         let [width, height] = image.size.map(|size| size as f32);
         let picture = part(&image, Rect::from_min_size(Pos2::ZERO, vec2(width, height)), 1.0)?;
         let png = picture.png().map_err(|error| error.to_string());
-        let told = |error| format!("`{}` cannot be written: {error}", file.display());
-        Some(png.and_then(|png| std::fs::write(file, png).map_err(told)))
+        let message = |error| format!("`{}` cannot be written: {error}", file.display());
+        Some(png.and_then(|png| std::fs::write(file, png).map_err(message)))
     }
 
     /// The part of the window that the picture covers, once it has come.
@@ -54,7 +54,7 @@ impl Taking {
     pub fn keep(&self, context: &egui::Context, rect: Rect, beside: &Path) -> Option<Told> {
         let picture = self.picture(context, rect)?;
         Some(match picture.png() {
-            Ok(png) => told(write_beside(beside, "picture", "png", &png)),
+            Ok(png) => message_of(write_beside(beside, "picture", "png", &png)),
             Err(error) => Told::failure(error.to_string()),
         })
     }
@@ -66,7 +66,7 @@ fn write_beside(scene: &Path, what: &str, extension: &str, bytes: &[u8]) -> std:
     file.write_all(bytes).map(|()| path)
 }
 
-fn told(written: std::io::Result<PathBuf>) -> Told {
+fn message_of(written: std::io::Result<PathBuf>) -> Told {
     match written {
         Ok(path) => Told::done(format!("`{}` was written", path.display())),
         Err(error) => Told::failure(format!("nothing can be written beside the scene: {error}")),
@@ -221,7 +221,7 @@ impl App {
         let button = ui.add_enabled(!changed.is_empty(), button);
         if button.on_hover_text("writes the scene with the changed numbers as NAME-changed.toml").clicked() {
             let (text, elsewhere) = text_with(&self.world.scene.source, &changed);
-            let written = told(write_beside(&self.file, "changed", "toml", text.as_bytes()));
+            let written = message_of(write_beside(&self.file, "changed", "toml", text.as_bytes()));
             self.message = Some(match elsewhere.is_empty() {
                 true => written,
                 false => Told {
@@ -250,8 +250,8 @@ impl App {
 
     /// Writes a picture that has come.
     pub(super) fn take_picture(&mut self, context: &egui::Context) {
-        let told = self.taking.keep(context, self.port.rect, &self.file);
-        self.message = told.or_else(|| self.message.take());
+        let message = self.taking.keep(context, self.port.rect, &self.file);
+        self.message = message.or_else(|| self.message.take());
     }
 }
 

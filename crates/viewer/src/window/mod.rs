@@ -139,9 +139,9 @@ fn run_window<A: eframe::App + 'static>(
         ..Default::default()
     };
     let outcome = Outcome::default();
-    let told = outcome.clone();
+    let shared = outcome.clone();
     let create = Box::new(move |context: &eframe::CreationContext<'_>| {
-        make(context, told).map(|app| Box::new(app) as Box<dyn eframe::App>).map_err(Into::into)
+        make(context, shared).map(|app| Box::new(app) as Box<dyn eframe::App>).map_err(Into::into)
     });
     eframe::run_native("Pliant", options, create).map_err(|error| WindowError::Window(error.to_string()))?;
     let outcome = outcome.lock().unwrap_or_else(PoisonError::into_inner).take();

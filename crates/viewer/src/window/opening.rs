@@ -36,8 +36,8 @@ impl Browser {
     pub fn turn(&mut self, scene: &Path) {
         self.shown = !self.shown;
         let file = scene.canonicalize().unwrap_or_else(|_| scene.to_owned());
-        let own = if file.ends_with("scene.toml") { file.parent() } else { Some(&*file) };
-        self.enter(own.and_then(Path::parent).unwrap_or(&file).to_owned());
+        let listed = if file.ends_with("scene.toml") { file.parent() } else { Some(&*file) };
+        self.enter(listed.and_then(Path::parent).unwrap_or(&file).to_owned());
         self.recent = recent();
     }
 
@@ -101,9 +101,9 @@ fn entries(folder: &Path) -> Vec<Entry> {
             false => scene.then_some(Entry::Scene(path)),
         }
     };
-    let mut all: Vec<Entry> = read.filter_map(|found| entry(found.path())).collect();
-    all.sort_unstable();
-    all
+    let mut entries: Vec<Entry> = read.filter_map(|found| entry(found.path())).collect();
+    entries.sort_unstable();
+    entries
 }
 
 /// The file that remembers scenes, a path a line; `None` where nothing is kept.
@@ -120,10 +120,10 @@ fn recent() -> Vec<PathBuf> {
 /// Remembers a scene. Where it cannot be written, it is forgotten.
 pub(super) fn remember(scene: &Path) {
     let (Some(file), Ok(scene)) = (memory(), scene.canonicalize()) else { return };
-    let mut all = recent();
-    all.retain(|path| *path != scene);
-    all.insert(0, scene);
-    let lines: String = all.iter().take(REMEMBERED).map(|path| format!("{}\n", path.display())).collect();
+    let mut scenes = recent();
+    scenes.retain(|path| *path != scene);
+    scenes.insert(0, scene);
+    let lines: String = scenes.iter().take(REMEMBERED).map(|path| format!("{}\n", path.display())).collect();
     let _ = file.parent().map(fs::create_dir_all);
     let _ = fs::write(file, lines);
 }
@@ -161,8 +161,8 @@ mod tests {
         for file in ["liver/scene.toml", "ball.toml", "skin.stl", "notes.md", "organs/a.csv"] {
             fs::write(at(file), "").unwrap();
         }
-        let own = ["ball.toml", "liver", "skin.stl"].map(|name| Entry::Scene(at(name)));
-        assert_eq!(entries(folder.path()), [&[Entry::Folder(at("organs"))], &own[..]].concat());
+        let scenes = ["ball.toml", "liver", "skin.stl"].map(|name| Entry::Scene(at(name)));
+        assert_eq!(entries(folder.path()), [&[Entry::Folder(at("organs"))], &scenes[..]].concat());
         let mut browser = Browser::default();
         browser.turn(&at("liver/scene.toml"));
         assert!(browser.shown && browser.entries.len() == 4);

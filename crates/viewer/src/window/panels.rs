@@ -217,8 +217,8 @@ impl App {
             ui.checkbox(&mut self.view.contacts, "Forces of contacts");
         }
         let mut marks = self.view.marks;
-        let told = "M: squares where nodes are held, dots where they are moved, bars under plates, arrows of loads and weights";
-        if ui.checkbox(&mut marks, "Constraints and loads").on_hover_text(told).changed() {
+        let explanation = "M: squares where nodes are held, dots where they are moved, bars under plates, arrows of loads and weights";
+        if ui.checkbox(&mut marks, "Constraints and loads").on_hover_text(explanation).changed() {
             self.show_marks(marks);
         }
         ui.checkbox(&mut self.port.style.wireframe, "Wireframe");
@@ -260,7 +260,7 @@ impl App {
     pub(super) fn fields(&self) -> Vec<FieldName> {
         let on = self.view.on.as_deref();
         let touches = self.world.touches(on);
-        let all = self.world.scene.fields_on(on).into_iter();
-        all.filter(|field| touches || !field.is_of_contact()).collect()
+        let fields = self.world.scene.fields_on(on).into_iter();
+        fields.filter(|field| touches || !field.is_of_contact()).collect()
     }
 }

@@ -19,7 +19,7 @@ type Making = (Vec<f64>, Receiver<Result<World, String>>);
 
 /// The numbers that can be changed.
 pub(super) struct Numbers {
-    all: Vec<Parameter>,
+    parameters: Vec<Parameter>,
     in_file: Vec<f64>,
     /// Numbers of the world that is played, or waits to be.
     accepted: Vec<f64>,
@@ -31,35 +31,40 @@ pub(super) struct Numbers {
 
 impl Numbers {
     pub(super) fn of(scene: &Scene) -> Self {
-        let all = parameters(scene);
-        let in_file: Vec<f64> = all.iter().map(|parameter| parameter.number.value).collect();
-        Self { all, accepted: in_file.clone(), in_file, making: None, undone: None }
+        let parameters = parameters(scene);
+        let in_file: Vec<f64> = parameters.iter().map(|parameter| parameter.number.value).collect();
+        Self { parameters, accepted: in_file.clone(), in_file, making: None, undone: None }
     }
 
     fn values(&self) -> Vec<f64> {
-        self.all.iter().map(|parameter| parameter.number.value).collect()
+        self.parameters.iter().map(|parameter| parameter.number.value).collect()
     }
 
     fn set(&mut self, values: &[f64]) {
-        self.all.iter_mut().zip(values).for_each(|(parameter, value)| parameter.number.value = *value);
+        self.parameters.iter_mut().zip(values).for_each(|(parameter, value)| parameter.number.value = *value);
     }
 
     /// Returns to the played numbers, of which `played` lists the ones that differ from the file.
     pub(super) fn refuse(&mut self, played: &[Number]) {
         let value = |parameter: &Parameter, file: f64| {
-            let own = played.iter().find(|number| number.path == parameter.number.path);
-            own.map_or(file, |number| number.value)
+            let differing = played.iter().find(|number| number.path == parameter.number.path);
+            differing.map_or(file, |number| number.value)
         };
-        let values: Vec<f64> =
-            self.all.iter().zip(&self.in_file).map(|(own, file)| value(own, *file)).collect();
+        let values: Vec<f64> = self
+            .parameters
+            .iter()
+            .zip(&self.in_file)
+            .map(|(parameter, file)| value(parameter, *file))
+            .collect();
         self.set(&values);
         self.accepted = values;
     }
 
     /// Returns the numbers among some values that differ from the file.
     fn changed(&self, values: &[f64]) -> Vec<Number> {
-        let all = self.all.iter().zip(values).zip(&self.in_file);
-        all.filter(|((_, value), file)| value != file)
+        let compared = self.parameters.iter().zip(values).zip(&self.in_file);
+        compared
+            .filter(|((_, value), file)| value != file)
             .map(|((parameter, value), _)| Number { value: *value, ..parameter.number.clone() })
             .collect()
     }
@@ -101,11 +106,11 @@ impl App {
         let mut released = false;
         let mut table = String::new();
         egui::CollapsingHeader::new("Laws, loads and bodies").show(ui, |ui| {
-            for parameter in &mut self.numbers.all {
-                let own = parameter.number.path[..2].join(".");
-                if own != table {
-                    ui.label(egui::RichText::new(&own).strong());
-                    table = own;
+            for parameter in &mut self.numbers.parameters {
+                let heading = parameter.number.path[..2].join(".");
+                if heading != table {
+                    ui.label(egui::RichText::new(&heading).strong());
+                    table = heading;
                 }
                 ui.horizontal(|ui| {
                     released |= dragged(ui, parameter);

@@ -23,15 +23,15 @@ struct Curve {
 
 /// Returns the available curves: the columns, and before the components of a vector its length.
 fn curves(samples: &Samples) -> Vec<Curve> {
-    let mut all = Vec::new();
+    let mut curves = Vec::new();
     for (index, column) in samples.columns().iter().enumerate() {
         if let Some(name) = column.name.strip_suffix(".x") {
             let columns = (index..index + 3).collect();
-            all.push(Curve { name: name.to_owned(), unit: column.unit, columns });
+            curves.push(Curve { name: name.to_owned(), unit: column.unit, columns });
         }
-        all.push(Curve { name: column.name.clone(), unit: column.unit, columns: vec![index] });
+        curves.push(Curve { name: column.name.clone(), unit: column.unit, columns: vec![index] });
     }
-    all
+    curves
 }
 
 /// Simulated time [s] of the plots of the last seconds.
@@ -42,9 +42,9 @@ fn words(name: &str) -> String {
     let parts: Vec<&str> = name.split('.').collect();
     let (parts, axis) = match &parts[..] {
         [head @ .., axis @ ("x" | "y" | "z")] if !head.is_empty() => (head, format!(", {axis}")),
-        all => (all, String::new()),
+        whole => (whole, String::new()),
     };
-    let told = match parts {
+    let text = match parts {
         ["hand"] => "force of the hand".into(),
         ["second-hand"] => "force of the second hand".into(),
         ["energy", kind] => format!("{kind} energy"),
@@ -53,7 +53,7 @@ fn words(name: &str) -> String {
         [of, field] => format!("{field} of {of}"),
         other => other.join(" "),
     };
-    format!("{told}{axis}")
+    format!("{text}{axis}")
 }
 
 /// Height of a plot on the screen.
@@ -121,11 +121,11 @@ impl App {
 
     /// Draws the curves, one plot for each unit, and the menu to choose them.
     pub(super) fn plots(&mut self, ui: &mut egui::Ui) {
-        let all = curves(&self.samples);
+        let available = curves(&self.samples);
         ui.horizontal(|ui| {
             ui.menu_button("Plot …", |ui| {
                 egui::ScrollArea::vertical().max_height(400.0).show(ui, |ui| {
-                    for curve in &all {
+                    for curve in &available {
                         let mut on = self.plotted.contains(&curve.name);
                         let text = format!("{} [{}]", words(&curve.name), curve.unit);
                         if ui.checkbox(&mut on, text).on_hover_text(&curve.name).changed() {
@@ -154,7 +154,8 @@ impl App {
                 self.order(Order::ForgetProbes);
             }
         });
-        let shown: Vec<&Curve> = all.iter().filter(|curve| self.plotted.contains(&curve.name)).collect();
+        let shown: Vec<&Curve> =
+            available.iter().filter(|curve| self.plotted.contains(&curve.name)).collect();
         let mut units: Vec<&str> = Vec::new();
         shown.iter().for_each(|curve| {
             if !units.contains(&curve.unit) {
@@ -166,8 +167,8 @@ impl App {
         }
         ui.columns(units.len(), |columns| {
             for (column, unit) in columns.iter_mut().zip(&units) {
-                let own = shown.iter().filter(|curve| curve.unit == *unit);
-                let lines = own.map(|curve| (words(&curve.name), self.points_of(curve)));
+                let of_unit = shown.iter().filter(|curve| curve.unit == *unit);
+                let lines = of_unit.map(|curve| (words(&curve.name), self.points_of(curve)));
                 draw(column, unit, lines.collect());
             }
         });
@@ -265,13 +266,13 @@ mod tests {
     fn numbers_at_axes_have_the_digits_of_their_step() {
         let cases =
             [(0.5, 0.5), (1.5, 0.5), (2.0, 1.0), (-1e-17, 0.5), (0.25, 0.25), (400.0, 200.0), (1e-3, 1e-3)];
-        let told = cases.map(|(value, step)| number(value, step));
-        assert_eq!(told, ["0.5", "1.5", "2", "0", "0.25", "400", "0.001"]);
+        let texts = cases.map(|(value, step)| number(value, step));
+        assert_eq!(texts, ["0.5", "1.5", "2", "0", "0.25", "400", "0.001"]);
     }
 
     #[test]
     fn curves_have_names_in_words() {
-        let told = [
+        let names = [
             "hand",
             "hand.x",
             "second-hand",
@@ -290,6 +291,6 @@ mod tests {
             "displacement of point 2",
             "pressure of balloon",
         ];
-        assert_eq!(told, expected);
+        assert_eq!(names, expected);
     }
 }

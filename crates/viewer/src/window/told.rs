@@ -64,7 +64,7 @@ impl App {
     /// does if it is sent again.
     pub(super) fn banner(&self) -> Vec<Told> {
         let warned = |text: String| Told { kind: Kind::Warning, text };
-        let open = |told: &Told| !self.closed.contains(&told.text);
+        let open = |message: &Told| !self.closed.contains(&message.text);
         let failure = self.frame.failure.clone().map(Told::failure).filter(open);
         let mut notes = self.frame.note.iter().chain(&self.warnings).cloned().map(warned);
         let second = self.message.clone().or_else(|| notes.find(open).filter(|_| failure.is_none()));
@@ -73,21 +73,21 @@ impl App {
 
     /// The lines, until they are closed.
     pub(super) fn tell(&mut self, ui: &mut Ui) {
-        for told in self.banner() {
-            if !tell(ui, Some(&told)) {
+        for shown in self.banner() {
+            if !tell(ui, Some(&shown)) {
                 continue;
             }
-            match self.message.take_if(|message| *message == told) {
+            match self.message.take_if(|message| *message == shown) {
                 Some(_) => {}
-                None => _ = self.closed.insert(told.text),
+                None => _ = self.closed.insert(shown.text),
             }
         }
     }
 }
 
 /// A message in a line, with a button that closes it; whether it was pressed.
-pub(super) fn tell(ui: &mut Ui, told: Option<&Told>) -> bool {
-    let Some(Told { kind, text }) = told else { return false };
+pub(super) fn tell(ui: &mut Ui, message: Option<&Told>) -> bool {
+    let Some(Told { kind, text }) = message else { return false };
     let dark = ui.visuals().dark_mode;
     let (word, paper, ink) = kind.look(dark);
     let frame = Frame::NONE.fill(paper).inner_margin(Margin::symmetric(10, 5));

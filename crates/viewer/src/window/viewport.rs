@@ -214,12 +214,12 @@ impl Viewport {
 
     /// Puts the body into a state: its points [m] and a value at each.
     pub fn set(&mut self, points: &[Vector3], values: &[f64]) {
-        let own = Arc::make_mut(&mut self.points);
-        own.clear();
-        own.extend_from_slice(points);
-        let own = Arc::make_mut(&mut self.values);
-        own.clear();
-        own.extend_from_slice(values);
+        let kept_points = Arc::make_mut(&mut self.points);
+        kept_points.clear();
+        kept_points.extend_from_slice(points);
+        let kept_values = Arc::make_mut(&mut self.values);
+        kept_values.clear();
+        kept_values.extend_from_slice(values);
         self.fresh = true;
     }
 

@@ -34,8 +34,8 @@ fn assert_distance(app: &App) {
     let [one, two] = &app.frame.followed[..] else { panic!("two points are followed") };
     let metres = (two.place - one.place).norm();
     let lines = app.read_points();
-    let told = lines[0].strip_prefix("1 to 2: ").and_then(|text| text.split_once(' '));
-    let (number, unit) = told.unwrap_or_else(|| panic!("{lines:?}"));
+    let reading = lines[0].strip_prefix("1 to 2: ").and_then(|text| text.split_once(' '));
+    let (number, unit) = reading.unwrap_or_else(|| panic!("{lines:?}"));
     let read = number.parse::<f64>().unwrap() * if unit == "mm" { 1e-3 } else { 1.0 };
     assert!(lines.len() == 3 && metres > 0.0 && (read / metres - 1.0).abs() < 0.01, "{lines:?}, {metres} m");
 }

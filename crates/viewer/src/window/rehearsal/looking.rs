@@ -100,7 +100,7 @@ fn a_film_is_taken_and_written() {
     let Some(mut window) = Rehearsal::painted(BALL) else { return };
     window.key("V begins a film", Key::V, |app| app.filming.pictures.len() >= 3);
     window.key("V ends the film, which is written", Key::V, |app| {
-        app.message.as_ref().is_some_and(|told| told.text.contains("-film.png` was written"))
+        app.message.as_ref().is_some_and(|message| message.text.contains("-film.png` was written"))
     });
     let film = std::fs::read(window.beside("ball-film.png")).unwrap();
     assert!(film.windows(4).any(|part| part == b"acTL"), "an animated PNG");
