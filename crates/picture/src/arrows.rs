@@ -26,9 +26,9 @@ pub type PointForce = [Vector3; 2];
 /// `None` without the field.
 pub fn contact_forces(mesh: &Mesh, points: &[Vector3]) -> Option<Vec<PointForce>> {
     let forces = mesh.point_data.get("contact-force").filter(|array| array.components == 3)?;
-    let all = points.iter().zip(forces.values.chunks_exact(3));
-    let all = all.map(|(point, force)| [*point, Vector3::new(force[0], force[1], force[2])]);
-    Some(all.filter(|[_, force]| force.iter().all(|x| x.is_finite()) && force.norm() > 0.0).collect())
+    let arrows = points.iter().zip(forces.values.chunks_exact(3));
+    let arrows = arrows.map(|(point, force)| [*point, Vector3::new(force[0], force[1], force[2])]);
+    Some(arrows.filter(|[_, force]| force.iter().all(|x| x.is_finite()) && force.norm() > 0.0).collect())
 }
 
 /// The largest of some forces [N]; 0 without any.

@@ -25,10 +25,10 @@ impl Layers {
         let opacity = |triangle: &[u32; 4]| opacities[(triangle[3] >> KIND) as usize];
         // A border belongs to the more opaque side.
         let border = |(triangle, &beyond): (&[u32; 4], &u32)| {
-            let (own, other) = (opacity(triangle), opacities[beyond as usize]);
+            let (here, other) = (opacity(triangle), opacities[beyond as usize]);
             let [a, b, c, word] = *triangle;
-            let kind = if own >= other { word >> KIND } else { beyond };
-            (own.min(other) < 1.0).then_some([a, b, c, (word & ((1 << KIND) - 1)) | (kind << KIND)])
+            let kind = if here >= other { word >> KIND } else { beyond };
+            (here.min(other) < 1.0).then_some([a, b, c, (word & ((1 << KIND) - 1)) | (kind << KIND)])
         };
         let (outer, inner) = subject.triangles.split_at(subject.outer);
         let borders = inner.iter().zip(&subject.beyond).filter_map(border);

@@ -48,13 +48,13 @@ const BEYOND: f64 = 1e-3;
 pub fn beyond([low, high]: [f64; 2], ends: Option<[f64; 2]>, unit: &str, factor: f64) -> Vec<String> {
     let Some([least, most]) = ends else { return Vec::new() };
     let room = BEYOND * (high - low);
-    let told = |word: &str, value: f64| {
+    let words = |word: &str, value: f64| {
         format!("{word} {} {unit}", three_digits(value * factor)).trim_end().to_owned()
     };
     let ends = [(most > high + room, "max", most), (least < low - room, "min", least)];
     ends.into_iter()
         .filter(|(is_beyond, ..)| high > low && *is_beyond)
-        .map(|(_, word, value)| told(word, value))
+        .map(|(_, word, value)| words(word, value))
         .collect()
 }
 
@@ -126,13 +126,13 @@ impl Legend {
     /// The labels with their names. Labels that are seen come first; the names of the others end in
     /// "(hidden)".
     fn told_labels(&self) -> Vec<(i32, String)> {
-        let told = |(label, name): &(i32, String)| match self.hidden.contains(label) {
+        let named = |(label, name): &(i32, String)| match self.hidden.contains(label) {
             true => (*label, format!("{name} (hidden)").trim_start().to_owned()),
             false => (*label, name.clone()),
         };
         let (hidden, seen): (Vec<_>, Vec<_>) =
             self.labels.iter().partition(|(label, _)| self.hidden.contains(label));
-        seen.into_iter().chain(hidden).map(told).collect()
+        seen.into_iter().chain(hidden).map(named).collect()
     }
 
     /// Part of the picture's width that the scale of colours or the names of labels take at the right.
@@ -413,9 +413,9 @@ mod tests {
 
     #[test]
     fn values_beyond_the_scale_are_written() {
-        let told = |ends| beyond([0.0, 2000.0], Some(ends), "kPa", 1e-3);
-        assert_eq!(told([0.0, 2000.5]), Vec::<String>::new());
-        assert_eq!(told([-10.0, 3456.0]), ["max 3.46 kPa", "min −0.0100 kPa"]);
+        let written = |ends| beyond([0.0, 2000.0], Some(ends), "kPa", 1e-3);
+        assert_eq!(written([0.0, 2000.5]), Vec::<String>::new());
+        assert_eq!(written([-10.0, 3456.0]), ["max 3.46 kPa", "min −0.0100 kPa"]);
         assert!(beyond([0.0, 0.0], Some([0.0, 1e-9]), "m", 1.0).is_empty(), "noise");
     }
 

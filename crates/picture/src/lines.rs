@@ -154,11 +154,13 @@ impl Fibres {
             let per_cell = kind.node_count();
             for face in chosen.iter().filter(|face| face.parent.kind == *kind) {
                 let at = face.parent.index as usize;
-                let own = &nodes[at * per_cell..(at + 1) * per_cell];
+                let cell_nodes = &nodes[at * per_cell..(at + 1) * per_cell];
                 let part = 1.0 / face.nodes().len() as f64;
-                let parts: Vec<f64> =
-                    own.iter().map(|node| if face.nodes().contains(node) { part } else { 0.0 }).collect();
-                self.surface.extend(self.line(first + at, *kind, own, &mesh.points, &parts));
+                let parts: Vec<f64> = cell_nodes
+                    .iter()
+                    .map(|node| if face.nodes().contains(node) { part } else { 0.0 })
+                    .collect();
+                self.surface.extend(self.line(first + at, *kind, cell_nodes, &mesh.points, &parts));
             }
             first += nodes.len() / per_cell;
         }
@@ -253,7 +255,7 @@ mod tests {
             let middle = 0.5 * (a + b);
             octants[(0..3).map(|c| usize::from(middle[c] > 0.5) << c).sum::<usize>()] += 1;
         }
-        assert!(octants.iter().all(|&own| own * 16 > surface.len()), "{octants:?}");
+        assert!(octants.iter().all(|&count| count * 16 > surface.len()), "{octants:?}");
     }
 
     #[test]

@@ -147,8 +147,8 @@ impl OcclusionMap {
         };
         let [places, facings, depth, rough, light] = [PLACES, FACINGS, DEPTH, LIGHT, LIGHT].map(texture);
         let of_surface = group(&pipelines.two, &[&places, &facings]);
-        let [of_rough, own] = [&rough, &light].map(|view| group(&pipelines.one, &[view]));
-        Self { size, places, facings, depth, rough, light, of_surface, of_rough, group: own }
+        let [of_rough, of_light] = [&rough, &light].map(|view| group(&pipelines.one, &[view]));
+        Self { size, places, facings, depth, rough, light, of_surface, of_rough, group: of_light }
     }
 
     /// True if the map suits pictures of this ratio of width to height.

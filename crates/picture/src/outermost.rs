@@ -46,11 +46,11 @@ mod tests {
 
     #[test]
     fn the_outermost_points_stay_among_many() {
-        let mut all = Outermost::default();
+        let mut outermost = Outermost::default();
         let far = Vector3::new(0.0, 3.0, 0.0);
-        all.add([far]);
+        outermost.add([far]);
         let directions = directions();
-        all.add((0..2 * MOST).map(|index| directions[index % 1000] * 0.5));
-        assert!(all.points().len() <= 1000 && all.points().contains(&far));
+        outermost.add((0..2 * MOST).map(|index| directions[index % 1000] * 0.5));
+        assert!(outermost.points().len() <= 1000 && outermost.points().contains(&far));
     }
 }

@@ -115,8 +115,8 @@ impl Picture {
             return;
         }
         let at = 4 * (y as usize * self.width as usize + x as usize);
-        for (own, new) in self.rgba[at..at + 3].iter_mut().zip(colour) {
-            *own = (f32::from(*own) * (1.0 - cover) + f32::from(new) * cover).round() as u8;
+        for (byte, new) in self.rgba[at..at + 3].iter_mut().zip(colour) {
+            *byte = (f32::from(*byte) * (1.0 - cover) + f32::from(new) * cover).round() as u8;
         }
     }
 }

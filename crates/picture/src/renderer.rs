@@ -422,8 +422,8 @@ impl Drawn {
 
     fn stage(&mut self, points: &[Vector3], values: &[f64]) {
         let mut reach = 0.0_f64;
-        for (index, (own, point)) in self.staged.iter_mut().zip(points).enumerate() {
-            *own = staged(point, values.get(index).copied().unwrap_or(f64::NAN));
+        for (index, (stored, point)) in self.staged.iter_mut().zip(points).enumerate() {
+            *stored = staged(point, values.get(index).copied().unwrap_or(f64::NAN));
             reach = reach.max((point - self.middle).norm_squared());
         }
         self.size = self.size.max(reach.sqrt());

@@ -184,7 +184,7 @@ impl Series {
 
     /// The mesh of the frame at a time [s].
     fn mesh_at(&self, time: f64) -> Result<Mesh, SeriesError> {
-        let at = self.frames.iter().position(|(own, _)| (own - time).abs() <= 1e-9 * time.abs());
+        let at = self.frames.iter().position(|(moment, _)| (moment - time).abs() <= 1e-9 * time.abs());
         self.mesh(at.ok_or(SeriesError::NoMarks)?)
     }
 

@@ -47,8 +47,8 @@ impl<'s> Sight<'s> {
         Self {
             subject,
             points,
-            section: parts.clone().map(|own| [0, 1, 2].map(|at| place(&own[at]))).collect(),
-            section_kinds: parts.map(|own| own[0].edges >> KIND).collect(),
+            section: parts.clone().map(|corners| [0, 1, 2].map(|at| place(&corners[at]))).collect(),
+            section_kinds: parts.map(|corners| corners[0].edges >> KIND).collect(),
             opaque: subject.kinds.iter().map(|kind| regions.coat(*kind).opacity >= 1.0).collect(),
             clip,
             camera: *camera,
@@ -107,9 +107,9 @@ impl<'s> Sight<'s> {
             let surface = surface.map(|(nodes, _)| nodes.map(|node| self.points[node as usize]));
             let cut = self.section.iter().zip(&self.section_kinds);
             let cut = cut.filter(|(_, kind)| of_label(**kind, *label)).map(|(corners, _)| *corners);
-            let all: Vec<[Vector3; 3]> = surface.chain(cut).collect();
-            let every = all.len().div_ceil(MOST).max(1);
-            !all.iter().step_by(every).any(|corners| {
+            let triangles: Vec<[Vector3; 3]> = surface.chain(cut).collect();
+            let every = triangles.len().div_ceil(MOST).max(1);
+            !triangles.iter().step_by(every).any(|corners| {
                 let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
                 let places = corners.iter().map(|corner| corner * 0.9 + middle * 0.1);
                 places.chain([middle]).any(|place| self.is_left(&place) && self.sees(&place))

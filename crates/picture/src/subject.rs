@@ -63,8 +63,8 @@ const ELEMENT_EDGES: &str = "element-edges";
 
 fn edges_of(block: Option<&CellBlock>, cell: u32) -> u32 {
     let edges = block.and_then(|block| block.data.get(ELEMENT_EDGES));
-    let own = edges.and_then(|edges| edges.values.get(cell as usize)).filter(|bits| bits.is_finite());
-    own.map_or(0b111, |&bits| bits as u32 & 0b111)
+    let mask = edges.and_then(|edges| edges.values.get(cell as usize)).filter(|bits| bits.is_finite());
+    mask.map_or(0b111, |&bits| bits as u32 & 0b111)
 }
 
 /// Cell data: 1 for obstacles and tools, 2 for things whose inside bodies touch, 0 for bodies.
@@ -117,12 +117,12 @@ impl Subject {
         let mut groups: Vec<u32> = Vec::new();
         let mut add = |faces: &[Patch], kinds: &mut Kinds| {
             let normals: Vec<Vector3> = faces.iter().map(|face| normal(&face.nodes, &mesh.points)).collect();
-            let Split { corners, vertices: own, groups: own_groups } =
+            let Split { corners, vertices: split_vertices, groups: split_groups } =
                 split_at_sharp_edges(faces, &normals, &places(mesh, faces));
             let first = vertices.len() as u32;
             let first_group = groups.iter().max().map_or(0, |last| last + 1);
-            vertices.extend(own);
-            groups.extend(own_groups.iter().map(|group| first_group + group));
+            vertices.extend(split_vertices);
+            groups.extend(split_groups.iter().map(|group| first_group + group));
             for (corners, Patch { parent, edges, .. }) in corners.iter().zip(faces) {
                 parents.resize(parents.len() + corners.len().saturating_sub(2).min(2), *parent);
                 let word = kinds.word(mesh.block(parent.kind), parent.index);
@@ -281,9 +281,9 @@ impl Subject {
 
     /// The points of the triangles of shells.
     pub(crate) fn shell_triangles(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
-        let own = self.triangles().zip(&self.parents).zip(&self.triangles);
-        let shells =
-            own.filter(|((_, parent), triangle)| parent.kind.dimension() == 2 && triangle[3] & STEEL == 0);
+        let with_parents = self.triangles().zip(&self.parents).zip(&self.triangles);
+        let shells = with_parents
+            .filter(|((_, parent), triangle)| parent.kind.dimension() == 2 && triangle[3] & STEEL == 0);
         shells.map(|((corners, _), _)| corners)
     }
 
@@ -472,11 +472,11 @@ fn split_at_sharp_edges(faces: &[Patch], normals: &[Vector3], places: &[u32]) ->
         }
         let mut number: BTreeMap<(usize, u32), u32> = BTreeMap::new();
         let mut known: BTreeMap<usize, u32> = BTreeMap::new();
-        for (&(face, corner), &own) in around.iter().zip(&group) {
+        for (&(face, corner), &smooth_group) in around.iter().zip(&group) {
             let point = faces[face as usize].nodes[corner as usize];
-            let vertex = *number.entry((own, point)).or_insert_with(|| {
+            let vertex = *number.entry((smooth_group, point)).or_insert_with(|| {
                 vertices.push(point);
-                groups.push(*known.entry(own).or_insert_with(|| {
+                groups.push(*known.entry(smooth_group).or_insert_with(|| {
                     count += 1;
                     count - 1
                 }));
@@ -503,10 +503,10 @@ pub fn deformed_points(mesh: &Mesh) -> Vec<Vector3> {
 /// [`nodal_values`] takes. `label` is included.
 pub fn field_choices(mesh: &Mesh) -> Vec<String> {
     let of_cells = mesh.blocks.iter().flat_map(|block| &block.data);
-    let all: BTreeMap<&String, usize> =
+    let fields: BTreeMap<&String, usize> =
         mesh.point_data.iter().chain(of_cells).map(|(name, array)| (name, array.components)).collect();
     let mut choices = Vec::new();
-    for (name, components) in all {
+    for (name, components) in fields {
         let parts: &[&str] = match components {
             3 => &["x", "y", "z"],
             9 => &["xx", "yy", "zz", "xy", "yz", "xz"],
@@ -671,10 +671,10 @@ pub(crate) mod tests {
         triangles.data.insert(ELEMENT_EDGES.into(), DataArray::scalar(vec![6.0, f64::NAN]));
         let edges: Vec<u32> = Subject::new(&mesh).triangles.iter().map(|triangle| triangle[3]).collect();
         assert_eq!(edges, [0b110, 0b111]);
-        let all = [0.0, 1.0, 2.0, f64::NAN];
+        let values = [0.0, 1.0, 2.0, f64::NAN];
         let subject = Subject::new(&mesh);
         let points = subject.showing_points(&Regions::default());
-        assert!(subject.lacks_value(&points, &all) && !subject.lacks_value(&points, &[0.0; 4]));
+        assert!(subject.lacks_value(&points, &values) && !subject.lacks_value(&points, &[0.0; 4]));
     }
 
     #[test]

@@ -151,7 +151,7 @@ fn difference(graphics: &Graphics, look: &Look, mesh: &Mesh, name: &str) -> Diff
 #[test]
 fn pictures_are_as_stored() {
     let Some(graphics) = graphics() else { return };
-    let all = [
+    let looks = [
         ("bodies", look()),
         ("section", section()),
         ("ghost", ghost()),
@@ -160,7 +160,7 @@ fn pictures_are_as_stored() {
         ("skin-under-colours", skin_under_colours()),
         ("wireframe", wireframe()),
     ];
-    for (name, look) in all {
+    for (name, look) in looks {
         let difference = difference(&graphics, &look, &fibrous(), name);
         assert!(difference.is_same(), "{name}: {difference:?}");
     }
@@ -289,8 +289,8 @@ fn forces_of_contacts_are_drawn_where_they_act_and_told_in_the_note() {
         .map(|pixel| [pixel % with.width, pixel / with.width])
         .collect();
     let span = |c: usize| {
-        let all = || changed.iter().map(|at| at[c]);
-        all().max().unwrap_or(0) - all().min().unwrap_or(0)
+        let places = || changed.iter().map(|at| at[c]);
+        places().max().unwrap_or(0) - places().min().unwrap_or(0)
     };
     // One upright arrow, of the one force.
     println!("{} pixels, {} wide and {} high", changed.len(), span(0), span(1));
@@ -319,8 +319,8 @@ fn organs_shine_each_in_its_way() {
         let covered = picture.rgba.chunks(4).filter(|pixel| pixel[3] == 255);
         let light = |byte: u8| ((f64::from(byte) / 255.0 + 0.055) / 1.055).powf(2.4);
         // Light above the reflection of a white lamp on this colour.
-        let own = light(material.colour()[2]);
-        covered.map(|pixel| light(pixel[2])).fold(0.0, f64::max) - own
+        let reflection = light(material.colour()[2]);
+        covered.map(|pixel| light(pixel[2])).fold(0.0, f64::max) - reflection
     };
     let [liver, bone] = [Material::Liver, Material::Bone].map(brightest_blue);
     assert!(liver > 0.15 && bone < 0.12, "{liver} {bone}");

@@ -17,14 +17,14 @@ fn sheet(doubled: bool) -> Mesh {
     };
     let mut nodes = Vec::new();
     for (i, j) in (0..64).map(|cell| (cell % 8, cell / 8)) {
-        let own = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|(i, j)| {
+        let corners = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|(i, j)| {
             let known = mesh.points.iter().position(|point| !doubled && *point == place(i, j));
             known.unwrap_or_else(|| {
                 mesh.points.push(place(i, j));
                 mesh.points.len() - 1
             }) as u32
         });
-        nodes.extend(own);
+        nodes.extend(corners);
     }
     mesh.block_mut(CellKind::Quad).nodes = nodes;
     mesh
@@ -48,13 +48,13 @@ fn nodes_that_are_doubled_leave_no_seam() {
 /// The picture of a sheet with the largest value at a node, with and without its mark; and the pixels that
 /// differ.
 fn marked(graphics: &Graphics, mesh: &mut Mesh, node: usize, azimuth: f64) -> (Picture, Vec<[f64; 2]>) {
-    let values = (0..mesh.points.len()).map(|own| if own == node { 5.0 } else { 0.01 * own as f64 });
+    let values = (0..mesh.points.len()).map(|index| if index == node { 5.0 } else { 0.01 * index as f64 });
     mesh.point_data.insert("pressure".into(), DataArray::scalar(values.collect()));
-    let own = look();
-    let camera = Camera { azimuth, ..own.camera };
+    let plain = look();
+    let camera = Camera { azimuth, ..plain.camera };
     let [with, without] = [true, false].map(|maximum| {
         let style = Style { maximum, ..Style::default() };
-        let look = Look { field: Some("pressure".into()), style, camera, ..own.clone() };
+        let look = Look { field: Some("pressure".into()), style, camera, ..plain.clone() };
         look.picture(graphics, mesh, None, 0.0).unwrap()
     });
     let pixels = with.rgba.chunks(4).zip(without.rgba.chunks(4)).enumerate();

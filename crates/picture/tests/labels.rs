@@ -53,12 +53,14 @@ fn counts(picture: &Picture) -> [usize; 4] {
         let white = rgb.min() * 0.9;
         rgb.map(|x| x - white).normalize()
     };
-    let own: Vec<Vector3> = (1..=3).map(|label| pure(&label_colour(label))).collect();
+    let pure_colours: Vec<Vector3> = (1..=3).map(|label| pure(&label_colour(label))).collect();
     let mut counts = [0; 4];
     for pixel in picture.rgba.chunks(4).filter(|pixel| pixel[3] > 250) {
         let colour = pure(pixel);
-        let nearest = (0..3).max_by(|&a, &b| own[a].dot(&colour).total_cmp(&own[b].dot(&colour))).unwrap();
-        counts[if own[nearest].dot(&colour) > 0.96 { nearest } else { 3 }] += 1;
+        let nearest = (0..3)
+            .max_by(|&a, &b| pure_colours[a].dot(&colour).total_cmp(&pure_colours[b].dot(&colour)))
+            .unwrap();
+        counts[if pure_colours[nearest].dot(&colour) > 0.96 { nearest } else { 3 }] += 1;
     }
     counts
 }
@@ -178,12 +180,13 @@ fn the_legend_tells_which_labels_nothing_is_seen_of_from_here() {
         let sight = Sight::new(&subject, &mesh.points, regions, None, &Section::default(), &camera);
         sight.hidden_labels(regions, [1, 2, 4].into_iter()).into_iter().collect()
     };
-    let all = Regions::default();
-    assert_eq!(hidden(-45.0, &all), [4]);
-    assert_eq!(hidden(135.0, &all), [0; 0]);
-    assert_eq!(hidden(45.0, &all), [0; 0], "the side of y");
+    let default_regions = Regions::default();
+    assert_eq!(hidden(-45.0, &default_regions), [4]);
+    assert_eq!(hidden(135.0, &default_regions), [0; 0]);
+    assert_eq!(hidden(45.0, &default_regions), [0; 0], "the side of y");
     let glass = Coat { opacity: 0.5, ..Coat::default() };
-    let through = Regions { coats: [1, 2].map(|label| (Region::Label(label), glass)).to_vec(), ..all };
+    let through =
+        Regions { coats: [1, 2].map(|label| (Region::Label(label), glass)).to_vec(), ..default_regions };
     assert_eq!(hidden(-45.0, &through), [0; 0]);
 }
 
