@@ -50,7 +50,7 @@ class Row:
     stvk: bool = False
     """Whether Pliant is compared by that law."""
     worker: subprocess.Popen[str] | None = None
-    told: IO[str] = field(init=False)
+    printed: IO[str] = field(init=False)
     """What the process prints."""
     found: dict[str, Any] = field(default_factory=dict)
     steps: int = IMPLICIT_STEPS
@@ -60,8 +60,8 @@ class Row:
     def open(self, cells: int, folder: str) -> None:
         """Starts the process, with a folder for what it leaves."""
         command = [sys.executable, str(HERE / self.script), self.key, str(cells)]
-        self.told = tempfile.TemporaryFile("w+")  # noqa: SIM115
-        self.worker = subprocess.Popen(command, cwd=folder, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self.told, text=True)
+        self.printed = tempfile.TemporaryFile("w+")  # noqa: SIM115
+        self.worker = subprocess.Popen(command, cwd=folder, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self.printed, text=True)
 
     def ask(self, **question: Any) -> dict[str, Any]:
         """The answer of the process."""
@@ -71,8 +71,8 @@ class Row:
             answer: dict[str, Any] = json.loads(self.worker.stdout.readline())
         except (BrokenPipeError, json.JSONDecodeError) as error:
             self.close()
-            self.told.seek(0)
-            raise SystemExit(f"{self.script} {self.key} failed:\n{self.told.read()}") from error
+            self.printed.seek(0)
+            raise SystemExit(f"{self.script} {self.key} failed:\n{self.printed.read()}") from error
         return answer
 
     def close(self) -> None:
@@ -163,8 +163,8 @@ def at_rest(row: Row) -> str:
     force, wanted = row.found["force"], row.found["wanted"]
     off = 0.0 if force is None else 100 * (force / wanted - 1)
     sign = "" if abs(off) < 0.005 else "+" if off > 0 else "−"
-    told = "–" if force is None else f"{abs(force):.4f} ({sign}{abs(off):.2f} %)"
-    return f"{told} | {100 * row.found['at rest']:.2f} %"
+    force_text = "–" if force is None else f"{abs(force):.4f} ({sign}{abs(off):.2f} %)"
+    return f"{force_text} | {100 * row.found['at rest']:.2f} %"
 
 
 def explicit_table(cells: int, rows: Sequence[Row]) -> list[str]:
@@ -179,7 +179,7 @@ def explicit_table(cells: int, rows: Sequence[Row]) -> list[str]:
     ]
     for row in rows:
         each = [1e9 * time / tets for time in row.times]
-        ratio = statistics.median(own / first for own, first in zip(row.times, rows[0].times, strict=True))
+        ratio = statistics.median(time / first for time, first in zip(row.times, rows[0].times, strict=True))
         lines.append(
             f"| {row.program} | {row.way} | {row.law} | {row.numbers} | {row.threads} | {statistics.median(each):.2f} | {min(each):.2f}–{max(each):.2f} "
             f"| {ratio:.2f} | {statistics.median(row.times) / cube.step:.3f} s | {at_rest(row)} |"
@@ -212,8 +212,8 @@ def machine() -> str:
     except (OSError, StopIteration):
         name = platform.machine()
     versions = {"Warp": "warp-lang", "Newton": "newton", "MuJoCo": "mujoco", "NumPy": "numpy"}
-    told = ", ".join(f"{program} {importlib.metadata.version(package)}" for program, package in versions.items())
-    return f"{name}, {CORES} cores, Python {platform.python_version()}; pliant {pliant.__version__}, {told}; {datetime.date.today()}."
+    packages = ", ".join(f"{program} {importlib.metadata.version(package)}" for program, package in versions.items())
+    return f"{name}, {CORES} cores, Python {platform.python_version()}; pliant {pliant.__version__}, {packages}; {datetime.date.today()}."
 
 
 def main() -> None:

@@ -50,15 +50,15 @@ fn list() -> String {
     let mut lines: Vec<String> = (CASES.iter())
         .map(|case| format!("{:<12} about {:>3.0} s  {}", case.id, case.seconds.max(1.0), case.title))
         .collect();
-    let all: f64 = CASES.iter().map(|case| case.seconds).sum();
-    lines.push(format!("{:<12} about {all:>3.0} s on two cores", "all"));
+    let seconds: f64 = CASES.iter().map(|case| case.seconds).sum();
+    lines.push(format!("{:<12} about {seconds:>3.0} s on two cores", "all"));
     lines.join("\n")
 }
 
 /// Computes with a bar on standard error that counts expected seconds; hidden without a terminal.
 fn compute(cases: &[&'static Case]) -> Report {
-    let all: f64 = cases.iter().map(|case| case.seconds).sum();
-    let bar = ProgressBar::new((10.0 * all).max(1.0) as u64);
+    let seconds: f64 = cases.iter().map(|case| case.seconds).sum();
+    let bar = ProgressBar::new((10.0 * seconds).max(1.0) as u64);
     let style = ProgressStyle::with_template("{bar:40} {percent:>3} %  {msg}  {elapsed}");
     bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
     bar.enable_steady_tick(Duration::from_millis(200));

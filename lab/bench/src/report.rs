@@ -152,7 +152,7 @@ pub struct Fit {
 
 impl Fit {
     /// The fits of all series of three meshes or more.
-    pub(crate) fn all(rows: &[Row]) -> Vec<Self> {
+    pub(crate) fn of_rows(rows: &[Row]) -> Vec<Self> {
         let mut fits = Vec::<Self>::new();
         for row in rows {
             if !fits.iter().any(|fit| fit.covers(&row.case)) {
@@ -393,7 +393,8 @@ impl Report {
 }
 
 fn rows_table(rows: &[Row]) -> String {
-    let told = |number: Option<f64>, words: fn(f64) -> String| number.map_or_else(|| "–".to_owned(), words);
+    let or_dash =
+        |number: Option<f64>, words: fn(f64) -> String| number.map_or_else(|| "–".to_owned(), words);
     let rows = rows.iter().map(|row| {
         let star = if row.critical_step_from == Limit::True { "" } else { "*" };
         [
@@ -406,10 +407,10 @@ fn rows_table(rows: &[Row]) -> String {
             format!("{:.2}", row.ns_per_element_step),
             format!("{:.2}–{:.2}", row.ns_least, row.ns_most),
             format!("{:.2}", 1e-6 * row.elements_per_second),
-            told(row.bytes_per_element, |bytes| format!("{bytes:.0}")),
-            told(row.flops_per_element, |flops| format!("{flops:.0}")),
-            told(row.bandwidth_fraction, |part| format!("{:.1} %", 100.0 * part)),
-            told(row.flop_fraction, |part| format!("{:.1} %", 100.0 * part)),
+            or_dash(row.bytes_per_element, |bytes| format!("{bytes:.0}")),
+            or_dash(row.flops_per_element, |flops| format!("{flops:.0}")),
+            or_dash(row.bandwidth_fraction, |part| format!("{:.1} %", 100.0 * part)),
+            or_dash(row.flop_fraction, |part| format!("{:.1} %", 100.0 * part)),
             format!("{:.4}{star}", 1e3 * row.critical_step),
             format!("{:.3}", row.real_time_factor),
             format!("{:.3}", row.seconds_per_second),

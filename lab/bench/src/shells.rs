@@ -120,8 +120,8 @@ impl ShellRun {
     }
 
     /// Mean time per step [ms], from the time of all steps.
-    fn mean(&self, all: Duration) -> f64 {
-        1e3 * all.as_secs_f64() / self.steps as f64
+    fn mean(&self, total: Duration) -> f64 {
+        1e3 * total.as_secs_f64() / self.steps as f64
     }
 }
 
@@ -206,11 +206,13 @@ impl ShellReport {
         );
         for (place, name, run) in &self.rows {
             let Phases { cells, preparation, solution, device, iterations, left_to_cpu, .. } = run.phases;
-            let [cells, preparation, solution] = [cells, preparation, solution].map(|all| run.mean(all));
-            let of_device = [device.upload, device.iterations, device.read_back].map(|all| match *place {
-                "gpu" => format!("{:.2}", run.mean(all)),
-                _ => String::new(),
-            });
+            let [cells, preparation, solution] =
+                [cells, preparation, solution].map(|duration| run.mean(duration));
+            let of_device =
+                [device.upload, device.iterations, device.read_back].map(|duration| match *place {
+                    "gpu" => format!("{:.2}", run.mean(duration)),
+                    _ => String::new(),
+                });
             let [upload, iterating, read_back] = of_device;
             let Times { median, least, most } = run.time;
             let [median, least, most] = [median, least, most].map(|seconds| 1e3 * seconds);

@@ -98,7 +98,7 @@ pub fn measure(
         }
     }
     progress(Progress { part: 1.0, now: "largest cubes in real time".into() });
-    let fits = Fit::all(&rows);
+    let fits = Fit::of_rows(&rows);
     let mut cubes = Vec::new();
     for fit in &fits {
         if let Some(case) = largest_in_real_time(fit, &rows) {
@@ -294,7 +294,7 @@ mod tests {
     #[test]
     fn a_cube_of_the_predicted_size_takes_as_long_as_it_simulates() {
         let rows = ["hex8-nh-1000-all", "hex8-nh-4096-all", "hex8-nh-15625-all"].map(|id| row(id, 50.0));
-        let fits = Fit::all(&rows);
+        let fits = Fit::of_rows(&rows);
         assert_eq!(fits.len(), 1);
         assert!((fits[0].ns_per_element_step - 50.0).abs() < 1e-9 && fits[0].largest_deviation < 1e-12);
         // n⁴ = 5e-3/50e-9 = 10⁵, n = 17.78.
@@ -305,10 +305,10 @@ mod tests {
     fn a_cost_that_is_not_linear_shows_as_a_deviation() {
         let rows = [("hex8-nh-1000", 40.0), ("hex8-nh-4096", 40.0), ("hex8-nh-15625", 60.0)]
             .map(|(id, ns)| row(id, ns));
-        let fit = &Fit::all(&rows)[0];
+        let fit = &Fit::of_rows(&rows)[0];
         assert!((40.0..60.0).contains(&fit.ns_per_element_step));
         assert!(fit.largest_deviation > 0.2 && fit.farthest == 15625);
-        assert!(Fit::all(&rows[..2]).is_empty());
+        assert!(Fit::of_rows(&rows[..2]).is_empty());
     }
 
     #[test]

@@ -106,11 +106,11 @@ mod drawn {
         use std::io::Write as _;
         static GRAPHICS: OnceLock<Option<Graphics>> = OnceLock::new();
         let open = || {
-            let told = |error: &PictureError| {
+            let note = |error: &PictureError| {
                 // Nobody reads it where standard error can't be written.
                 let _ = writeln!(std::io::stderr(), "note: no pictures: {error}; {}", error.remedy());
             };
-            Graphics::open().inspect_err(told).ok()
+            Graphics::open().inspect_err(note).ok()
         };
         GRAPHICS.get_or_init(open).as_ref()
     }

@@ -67,8 +67,8 @@ pub(crate) struct Plot<'a> {
 impl Plot<'_> {
     /// The plot as a figure.
     pub fn figure(&self, caption: impl Into<String>) -> Result<Figure, CaseError> {
-        let all = || self.curves.iter().flat_map(|curve| &curve.points).copied();
-        let [x, y] = [extent(all().map(|p| p.0)), extent(all().map(|p| p.1))];
+        let points = || self.curves.iter().flat_map(|curve| &curve.points).copied();
+        let [x, y] = [extent(points().map(|p| p.0)), extent(points().map(|p| p.1))];
         let svg = drawn(|area| {
             let mut chart = ChartBuilder::on(area);
             layout(&mut chart, self.title);

@@ -63,7 +63,7 @@ impl Equilibrium {
             speed: (0..model.node_count()).map(|node| length(now.velocity(node))).fold(0.0, f64::max),
             reactions: constraints
                 .enumerate()
-                .map(|(at, own)| (own.name.clone(), now.reaction(at)))
+                .map(|(at, constraint)| (constraint.name.clone(), now.reaction(at)))
                 .collect(),
         })
     }

@@ -248,9 +248,9 @@ fn voxel_surface(region: &Region) -> Mesh {
     };
     let (mut numbers, mut points, mut quads) = (HashMap::new(), Vec::new(), Vec::new());
     for at in (0..region.inside.len()).filter(|&at| region.inside[at]) {
-        let own = region.grid.triple(at).map(|i| i as i64);
+        let cell = region.grid.triple(at).map(|i| i as i64);
         for (axis, side) in (0..3).flat_map(|axis| [(axis, 0), (axis, 1)]) {
-            let mut neighbour = own;
+            let mut neighbour = cell;
             neighbour[axis] += 2 * side - 1;
             if inside(neighbour) {
                 continue;
@@ -259,7 +259,7 @@ fn voxel_surface(region: &Region) -> Mesh {
             let turns =
                 if side == 1 { [[0, 0], [1, 0], [1, 1], [0, 1]] } else { [[0, 0], [0, 1], [1, 1], [1, 0]] };
             for [shift_b, shift_c] in turns {
-                let mut corner = own;
+                let mut corner = cell;
                 corner[axis] += side;
                 corner[b] += shift_b;
                 corner[c] += shift_c;

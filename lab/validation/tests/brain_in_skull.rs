@@ -97,17 +97,17 @@ fn a_real_brain_stays_in_its_skull() {
         let file = matter.join(format!("mni_icbm152_{part}_2009a_sym.nii.gz"));
         file.display().to_string()
     });
-    let own = "mesh = { file = \"../brain-shift/ellipsoid.vtu\" }";
+    let mesh_line = "mesh = { file = \"../brain-shift/ellipsoid.vtu\" }";
     let image = format!(
         "mesh = {{ image = '{grey}', add = '{white}', threshold = 0.5, edge = 0.012, \
          clean = {{ close-gaps = 0.004, fill-holes = true, keep-largest = true }} }}"
     );
-    assert!(text.contains(own));
+    assert!(text.contains(mesh_line));
     // The first world is there for its mesh.
     let (before, contact) = text.split_once("[obstacle.skull]").unwrap();
     let after = contact.split_once("friction = 0\n").unwrap().1;
     let meshed = world(
-        Source::parse("scene.toml", format!("{before}{after}").replace(own, &image)).unwrap(),
+        Source::parse("scene.toml", format!("{before}{after}").replace(mesh_line, &image)).unwrap(),
         Path::new("."),
     );
     let folder = tempfile::tempdir().unwrap();

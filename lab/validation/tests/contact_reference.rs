@@ -162,15 +162,15 @@ fn pressed(
         with: With::Rigid(0),
         touch: Touch { friction: 0.0, offset: 0.0 },
     };
-    let own = |face: &[u32; 3]| face.iter().all(|node| around.contains(node));
-    let outer = triangles.iter().copied().filter(own).collect();
+    let is_outer = |face: &[u32; 3]| face.iter().all(|node| around.contains(node));
+    let outer = triangles.iter().copied().filter(is_outer).collect();
     let contacts = vec![contact(&around, outer), contact(&pole, Vec::new())];
     let contacts = Arc::new(Contacts { rigids: vec![tool.clone()], contacts, ..Default::default() });
     let mut stepper = CentralDifference::<f64>::new(model.clone(), step).unwrap().with_contacts(contacts);
     let mut state = State::at_rest(&model);
     let force =
         |stepper: &CentralDifference<f64>, which: usize| 4.0 * stepper.contact_forces()[which][2].abs();
-    let mut all = Vec::new();
+    let mut presses = Vec::new();
     for k in 1..=depths.len() {
         // A step uses the pose at its end, which must be before the thing moves on.
         let until = (k as f64 * (MOVES + STAYS) - 2.0) * step;
@@ -201,10 +201,10 @@ fn pressed(
         };
         let pressure = 0.25 * inner / quarter.area(&pole, place);
         let total = outer + inner;
-        all.push(Pressed { force: total, radii, pressure, change: (total / before - 1.0).abs() });
+        presses.push(Pressed { force: total, radii, pressure, change: (total / before - 1.0).abs() });
         stepper.advance(&mut state);
     }
-    all
+    presses
 }
 
 /// The gap [m] below which the barrier acts: 1 % of the least depth.
@@ -240,7 +240,7 @@ fn pressed_at_a_barrier(quarter: &Quarter, depths: &[f64], near_pole: f64) -> Ve
     let settings = StaticSettings { iterations: 200, ..StaticSettings::default() };
     let mut solver = Statics::new(model.clone(), settings).unwrap();
     let mut state = pliant_implicit::AssemblyState::at_rest(&model);
-    let (mut all, mut iterations, mut before) = (Vec::new(), 0, 0.0);
+    let (mut presses, mut iterations, mut before) = (Vec::new(), 0, 0.0);
     for (depth, time) in depths.iter().zip(1..) {
         let parts = ((depth - before) / 1e-4).round();
         before = *depth;
@@ -252,17 +252,17 @@ fn pressed_at_a_barrier(quarter: &Quarter, depths: &[f64], near_pole: f64) -> Ve
         let mut radii = [0.0_f64, f64::INFINITY];
         for &node in nodes.iter().filter(|&&node| model.rest[node as usize][1].abs() < 1e-9) {
             let from_axis = radius(state.position[node as usize].into());
-            match now.nodes.binary_search_by_key(&node, |own| own.node) {
+            match now.nodes.binary_search_by_key(&node, |touch| touch.node) {
                 Ok(_) => radii[0] = radii[0].max(from_axis),
                 Err(_) => radii[1] = radii[1].min(from_axis),
             }
         }
         let inner: f64 = pole.iter().map(|&node| now.forces[6 * node as usize + 2]).sum();
         let pressure = inner / quarter.area(&pole, |node| state.position[node as usize]);
-        all.push(Pressed { force: 4.0 * now.totals[0][2].abs(), radii, pressure, change: 0.0 });
+        presses.push(Pressed { force: 4.0 * now.totals[0][2].abs(), radii, pressure, change: 0.0 });
     }
     println!("{iterations} iterations");
-    all
+    presses
 }
 
 fn column(rows: &[&Value], key: &str) -> Vec<f64> {
@@ -306,31 +306,31 @@ fn check_ball(cells: i32, layers: i32, at_a_barrier: bool, wanted: &[f64], limit
         pressed(&quarter, Shape::HalfSpace, Pose::identity(), 1.0, &depths, pole)
     };
     let (mut force, mut edges, mut pressure, mut change) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
-    for (row, own) in rows.iter().zip(&found) {
+    for (row, measured) in rows.iter().zip(&found) {
         let [delta, f, a, p] = ["delta", "F", "a", "p0"].map(|key| row[key].as_f64().unwrap());
-        let [inner, outer] = own.radii;
+        let [inner, outer] = measured.radii;
         let beside = (0.5 * (inner + outer) - a).abs() / (outer - inner);
         println!(
             "{:.1} mm: {:.2} mN of {:.2} ({:+.2} %, still {:.0e}), radius {:.2} to {:.2} mm of {:.2}, {:.0} Pa of {p:.0} ({:+.1} %)",
             1e3 * delta,
-            1e3 * own.force,
+            1e3 * measured.force,
             1e3 * f,
-            100.0 * (own.force / f - 1.0),
-            own.change,
+            100.0 * (measured.force / f - 1.0),
+            measured.change,
             1e3 * inner,
             1e3 * outer,
             1e3 * a,
-            own.pressure,
-            100.0 * (own.pressure / p - 1.0)
+            measured.pressure,
+            100.0 * (measured.pressure / p - 1.0)
         );
-        force = force.max((own.force / f - 1.0).abs());
+        force = force.max((measured.force / f - 1.0).abs());
         let modulus = 1e4 / (1.0 - 0.45_f64.powi(2));
-        let hertz = (6.0 * own.force * modulus.powi(2) / (PI.powi(3) * 0.02_f64.powi(2))).cbrt();
+        let hertz = (6.0 * measured.force * modulus.powi(2) / (PI.powi(3) * 0.02_f64.powi(2))).cbrt();
         if delta <= 0.001 {
-            pressure = pressure.max((own.pressure / hertz - 1.0).abs());
-            println!("{:.0} Pa by Hertz ({:+.1} %)", hertz, 100.0 * (own.pressure / hertz - 1.0));
+            pressure = pressure.max((measured.pressure / hertz - 1.0).abs());
+            println!("{:.0} Pa by Hertz ({:+.1} %)", hertz, 100.0 * (measured.pressure / hertz - 1.0));
         }
-        (edges, change) = (edges.max(beside), change.max(own.change));
+        (edges, change) = (edges.max(beside), change.max(measured.change));
     }
     claim("ball: force still changes, over it", change, 2e-3);
     claim("ball: force over the reference", force, limits[0]);
@@ -380,27 +380,27 @@ fn check_tool(cells: i32, layers: i32, wanted: &[f64], limits: [f64; 2]) {
     let pole = 2.5 * 1.36e-3 / f64::from(cells);
     let found = pressed(&quarter, shape, start, -1.0, &depths, pole);
     let (mut force, mut edges, mut pressure, mut change) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
-    for (row, own) in rows.iter().zip(&found) {
+    for (row, measured) in rows.iter().zip(&found) {
         let [depth, f, a, p] =
             ["depth", "F", "contact_half_width", "p_centre"].map(|key| row[key].as_f64().unwrap());
-        let [inner, outer] = own.radii;
+        let [inner, outer] = measured.radii;
         println!(
             "{:.1} mm: {:.2} mN of {:.2} ({:+.2} %, still {:.0e}), radius {:.2} to {:.2} mm of {:.2}, {:.0} Pa of {p:.0} ({:+.1} %)",
             1e3 * depth,
-            1e3 * own.force,
+            1e3 * measured.force,
             1e3 * f,
-            100.0 * (own.force / f - 1.0),
-            own.change,
+            100.0 * (measured.force / f - 1.0),
+            measured.change,
             1e3 * inner,
             1e3 * outer,
             1e3 * a,
-            own.pressure,
-            100.0 * (own.pressure / p - 1.0)
+            measured.pressure,
+            100.0 * (measured.pressure / p - 1.0)
         );
-        force = force.max((own.force / f - 1.0).abs());
-        pressure = pressure.max((own.pressure / p - 1.0).abs());
+        force = force.max((measured.force / f - 1.0).abs());
+        pressure = pressure.max((measured.pressure / p - 1.0).abs());
         edges = edges.max((0.5 * (inner + outer) - a).abs() / (outer - inner));
-        change = change.max(own.change);
+        change = change.max(measured.change);
     }
     claim("tool: force still changes, over it", change, 2e-3);
     claim("tool: force over the reference", force, limits[0]);

@@ -85,8 +85,9 @@ impl Hanging {
 /// Points of the free part of the liver, 10 mm apart and off all grids.
 fn points(liver: &Boxed) -> Vec<Vector3> {
     let along = |i: usize| -0.1193 + 0.01 * i as f64;
-    let all = (0..24 * 24 * 24).map(|at| Vector3::new(along(at % 24), along(at / 24 % 24), along(at / 576)));
-    all.filter(|point| point.x > -0.04 && liver.value(point) > 0.001).collect()
+    let lattice =
+        (0..24 * 24 * 24).map(|at| Vector3::new(along(at % 24), along(at / 24 % 24), along(at / 576)));
+    lattice.filter(|point| point.x > -0.04 && liver.value(point) > 0.001).collect()
 }
 
 /// Root mean square of a − b over the root mean square of b.

@@ -45,21 +45,21 @@ impl Layers {
     fn least(&self, moved: &[[f64; 3]]) -> f64 {
         let now: Vec<_> = self.rest.iter().zip(moved).map(|(x, u)| x + Vector3::from(*u)).collect();
         let of = |kind: Kind, nodes: [u32; 4]| {
-            let [own, rest] = [&now, &self.rest].map(|places| nodes.map(|n| places[n as usize]));
+            let [corners, rest] = [&now, &self.rest].map(|places| nodes.map(|n| places[n as usize]));
             let middles = match kind {
-                Kind::PointTriangle => own[0] - (own[1] + own[2] + own[3]) / 3.0,
-                Kind::EdgeEdge => 0.5 * (own[0] + own[1] - own[2] - own[3]),
+                Kind::PointTriangle => corners[0] - (corners[1] + corners[2] + corners[3]) / 3.0,
+                Kind::EdgeEdge => 0.5 * (corners[0] + corners[1] - corners[2] - corners[3]),
             };
             let is_pair = middles.norm_squared() < 1e-6 && kind.nearest(&rest).distance > NEIGHBOURS;
-            if is_pair { kind.nearest(&own).distance } else { f64::INFINITY }
+            if is_pair { kind.nearest(&corners).distance } else { f64::INFINITY }
         };
         let points = (0..now.len() as u32).into_par_iter().map(|p| {
-            let own = self.triangles.iter().map(|&[a, b, c]| of(Kind::PointTriangle, [p, a, b, c]));
-            own.fold(f64::INFINITY, f64::min)
+            let distances = self.triangles.iter().map(|&[a, b, c]| of(Kind::PointTriangle, [p, a, b, c]));
+            distances.fold(f64::INFINITY, f64::min)
         });
         let edges = self.edges.par_iter().enumerate().map(|(k, &[a, b])| {
-            let own = self.edges[k + 1..].iter().map(|&[c, d]| of(Kind::EdgeEdge, [a, b, c, d]));
-            own.fold(f64::INFINITY, f64::min)
+            let distances = self.edges[k + 1..].iter().map(|&[c, d]| of(Kind::EdgeEdge, [a, b, c, d]));
+            distances.fold(f64::INFINITY, f64::min)
         });
         points.chain(edges).reduce(|| f64::INFINITY, f64::min)
     }

@@ -153,15 +153,16 @@ fn rotated_nodes_stay_on_their_circles_and_turn_a_body_without_stress() {
         let mut worst = 0.0;
         run::<f64>(&block.model, 0.5 * block.element_bound(), 0.5, |_, state| {
             let part = curve.value(state.time);
-            let all = nodes.iter().map(|&node| off(state.displacement[node as usize], node as usize, part));
-            worst = largest(all.chain([worst]));
+            let deviations =
+                nodes.iter().map(|&node| off(state.displacement[node as usize], node as usize, part));
+            worst = largest(deviations.chain([worst]));
         })
         .unwrap();
         claim(&format!("{cells:?}: off the circles over an edge"), worst, 1e-14);
         let block = block.damped(30.0);
         let rested = settle(&block.model, 0.5 * block.element_bound(), 5.0);
-        let all = (0..rest.len()).map(|node| off(rested.displacement[node], node, 1.0));
-        claim(&format!("{cells:?}: off the rotation of the whole"), largest(all), 1e-6);
+        let deviations = (0..rest.len()).map(|node| off(rested.displacement[node], node, 1.0));
+        claim(&format!("{cells:?}: off the rotation of the whole"), largest(deviations), 1e-6);
         // Against the force of 1 % strain on a face: some 30 Pa × 0.01 m².
         claim(&format!("{cells:?}: reaction [N]"), length(rested.reaction("turn")), 1e-5);
     }

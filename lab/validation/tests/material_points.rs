@@ -127,9 +127,9 @@ fn every_reference_material_is_named_by_a_test_of_this_file() {
 
 /// μ = 0.7, κ = 5, and further parameters of the law.
 fn matrix(extra: Value) -> Value {
-    let mut all = json!({ "shear-modulus": SHEAR, "bulk-modulus": 5.0 });
-    all.as_object_mut().unwrap().extend(extra.as_object().unwrap().clone());
-    all
+    let mut parameters = json!({ "shear-modulus": SHEAR, "bulk-modulus": 5.0 });
+    parameters.as_object_mut().unwrap().extend(extra.as_object().unwrap().clone());
+    parameters
 }
 
 /// μ = 0.7, λ = 1.3.

@@ -217,7 +217,7 @@ fn niftysims_main_loop_as_written_down_meets_niftysim() {
 #[test]
 fn niftysims_load_shapes_act_at_niftysims_steps() {
     let model = fs::read_to_string(data_file("niftysim/T4_NH.xml")).unwrap();
-    let own = model.rfind("<Constraint").unwrap();
+    let constraint_start = model.rfind("<Constraint").unwrap();
     let rest = &model[model.find("<SystemParams>").unwrap()..];
     let top: Vec<String> = TOP.map(|node| node.to_string()).collect();
     let nodes =
@@ -260,8 +260,10 @@ fn niftysims_load_shapes_act_at_niftysims_steps() {
                     faces.join(" ")
                 ),
             };
-            let text =
-                format!("{}<Constraint LoadShape=\"{shape}\" {what}</Constraint>{rest}", &model[..own]);
+            let text = format!(
+                "{}<Constraint LoadShape=\"{shape}\" {what}</Constraint>{rest}",
+                &model[..constraint_start]
+            );
             let file = folder.path().join("model.xml");
             fs::write(&file, text).unwrap();
             let theirs = reference.run(load, magnitude, amplitude);

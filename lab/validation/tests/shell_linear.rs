@@ -71,16 +71,16 @@ fn clamped_plate_of_distorted_cells() {
 #[test]
 fn numbering_changes_no_deflection() {
     let mesh = plate_mesh(16, Pattern::Diagonal, Some(Distortion { amount: 0.2, seed: 3 }));
-    let own = clamped_plate(mesh.clone(), Formulation::default());
+    let deflection = clamped_plate(mesh.clone(), Formulation::default());
     for seed in 1..=5 {
         let other = clamped_plate(renumbered(&mesh, seed).0, Formulation::default());
-        claim("clamped plate, renumbered", (other / own - 1.0).abs(), 1e-10);
+        claim("clamped plate, renumbered", (other / deflection - 1.0).abs(), 1e-10);
     }
     let comas = Formulation { bending: Bending::Comas2010, ..Formulation::default() };
-    let own = clamped_plate(mesh.clone(), comas);
+    let deflection = clamped_plate(mesh.clone(), comas);
     let other = clamped_plate(renumbered(&mesh, 1).0, comas);
-    println!("the element of Comas: {own:.3}, renumbered {other:.3}");
-    assert!((other / own - 1.0).abs() > 1e-3, "{own} {other}");
+    println!("the element of Comas: {deflection:.3}, renumbered {other:.3}");
+    assert!((other / deflection - 1.0).abs() > 1e-3, "{deflection} {other}");
 }
 
 /// Compares uniform pressure on the curved surface (Jᵀ) with a third to each corner, on clamped and simply

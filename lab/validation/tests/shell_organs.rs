@@ -449,14 +449,14 @@ fn leak(valve: &Valve, state: &AssemblyState, apart: f64) -> f64 {
             .fold(f64::INFINITY, f64::min);
     let corners: Vec<[[f64; 2]; 3]> =
         valve.cells.iter().map(|cell| cell.map(|n| flat(&state.position[n as usize]))).collect();
-    let (mut all, mut open) = (0, 0);
+    let (mut samples, mut open) = (0, 0);
     for i in -60..=60 {
         for j in -60..=60 {
             let p = [f64::from(i), f64::from(j)].map(|k| radius * k / 60.0);
             if p[0].hypot(p[1]) > radius {
                 continue;
             }
-            all += 1;
+            samples += 1;
             let covers = |[a, b, c]: &[[f64; 2]; 3]| {
                 let side = |u: &[f64; 2], v: &[f64; 2]| {
                     (v[0] - u[0]) * (p[1] - u[1]) - (v[1] - u[1]) * (p[0] - u[0])
@@ -473,7 +473,7 @@ fn leak(valve: &Valve, state: &AssemblyState, apart: f64) -> f64 {
             open += u32::from(!corners.iter().any(covers));
         }
     }
-    f64::from(open) / f64::from(all)
+    f64::from(open) / f64::from(samples)
 }
 
 /// Time [s] after the peak of the deck's pressure, 13.03 kPa at 0.305 s.
@@ -505,13 +505,13 @@ fn valve_leaflets_coapt_and_hold_their_pressure() {
     let mut solver = BackwardEuler::new(valve.model.clone(), settings).unwrap();
     let mut state = AssemblyState::at_rest(&valve.model);
     let start = Instant::now();
-    let (mut iterations, mut told) = (0, 0.0);
+    let (mut iterations, mut next_report) = (0, 0.0);
     let opened = leak(&valve, &state, LEAFLET + barrier);
     while state.time < PEAK {
         let made = solver.advance(&mut state).unwrap_or_else(|error| panic!("{:.4} s: {error}", state.time));
         iterations += made.residuals.len();
-        if state.time >= told {
-            told += 0.05;
+        if state.time >= next_report {
+            next_report += 0.05;
             let now = solver.contact().unwrap().now();
             println!(
                 "{:.3} s: {} nodes touch, least gap {:.1e} m, open {:.3}, {iterations} iterations, {:.0} s",
@@ -524,7 +524,7 @@ fn valve_leaflets_coapt_and_hold_their_pressure() {
         }
     }
     let now = solver.contact().unwrap().now();
-    let touching: Vec<u32> = now.nodes.iter().map(|own| own.node).collect();
+    let touching: Vec<u32> = now.nodes.iter().map(|touch| touch.node).collect();
     let loose = |n: &&u32| valve.held.binary_search(n).is_err();
     let free: Vec<u32> = valve.free.iter().filter(loose).copied().collect();
     let lie = free.iter().filter(|n| touching.binary_search(n).is_ok()).count() as f64 / free.len() as f64;

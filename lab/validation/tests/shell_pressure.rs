@@ -150,8 +150,8 @@ fn a_free_cylinder_under_pressure_stays_round() {
     // The reference values, from one mesh, are 1.0 and 2.2 %. On twelve meshes the prototype's formulas, in
     // its axes, give 0.6 to 1.1 and 2.0 to 5.0 %.
     for (thickness, limit) in [(0.04, 0.012), (0.01, 0.055)] {
-        let all: Vec<f64> = (1..=12).map(|seed| worst(Cut::Irregular(seed), thickness)).collect();
-        let [least, most] = bounds(&all);
+        let deviations: Vec<f64> = (1..=12).map(|seed| worst(Cut::Irregular(seed), thickness)).collect();
+        let [least, most] = bounds(&deviations);
         println!(
             "twelve irregular cylinders, t = {thickness}: off by {:.2} to {:.2} %",
             100.0 * least,
@@ -196,12 +196,12 @@ fn a_tube_widens_as_its_ends_allow() {
         let mut state = AssemblyState::at_rest(&tube.model);
         solver.solve(&mut state, 1e-3).unwrap();
         let around = |facet: usize| {
-            let own = state.resultants(&tube.model, facet).unwrap();
+            let resultants = state.resultants(&tube.model, facet).unwrap();
             let nodes = tube.model.facets[facet].nodes.map(|node| tube.model.place(node as usize));
             let middle = (nodes[0] + nodes[1] + nodes[2]) / 3.0;
-            let tangent = own.axes.transpose() * Vector3::new(-middle.y, middle.x, 0.0).normalize();
+            let tangent = resultants.axes.transpose() * Vector3::new(-middle.y, middle.x, 0.0).normalize();
             let [a, b] = [tangent.x, tangent.y];
-            let [xx, yy, xy] = own.membrane.into();
+            let [xx, yy, xy] = resultants.membrane.into();
             (a * a * xx + b * b * yy + 2.0 * a * b * xy) / (1e-3 * pressure * radius)
         };
         let stresses: Vec<f64> = (0..tube.model.facets.len()).map(around).collect();

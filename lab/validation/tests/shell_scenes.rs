@@ -48,8 +48,8 @@ fn table(name: &str, changes: &[&str]) -> Table {
     let out = tempfile::tempdir().unwrap();
     let outputs = OutputFolder::prepare(out.path().join(name), &scene, false).unwrap();
     let summary = run(&world, &outputs, &mut |_| {}).unwrap();
-    let told = serde_json::to_value(&summary).unwrap();
-    assert_eq!(told["status"], "done", "{name}: {told}");
+    let report = serde_json::to_value(&summary).unwrap();
+    assert_eq!(report["status"], "done", "{name}: {report}");
     let text = std::fs::read_to_string(outputs.path().join("history.csv")).unwrap();
     let mut lines = text.lines();
     let header = lines.next().unwrap().split(',').map(str::to_owned).collect();

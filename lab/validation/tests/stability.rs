@@ -21,9 +21,9 @@ const CELLS: [VolumeCell; 2] = [VolumeCell::Tet, VolumeCell::Hex];
 /// Laws that stiffen in many ways: little, by fibres, by exponentials, up to a lock.
 fn laws() -> Vec<(&'static str, AnyLaw)> {
     let with = |more: Value| {
-        let mut all = json!({ "shear-modulus": 1000.0, "bulk-modulus": 10_000.0 });
-        all.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
-        all
+        let mut parameters = json!({ "shear-modulus": 1000.0, "bulk-modulus": 10_000.0 });
+        parameters.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+        parameters
     };
     let named = |name: &'static str, parameters: Value| (name, law(name, parameters));
     vec![

@@ -129,23 +129,23 @@ impl Vessel {
             })
         });
         let model = Assembly::new("vessel", places);
-        let mut own =
+        let mut vessel =
             Self { model, around, layers: [deposit, deposit + wall], along: heights.len() as u32 - 1 };
-        own.add("deposit", young, 0..deposit)?;
+        vessel.add("deposit", young, 0..deposit)?;
         if wall > 0 {
-            own.add("wall", WALL[0], deposit..deposit + wall)?;
+            vessel.add("wall", WALL[0], deposit..deposit + wall)?;
         } else {
-            let faces = own.faces(deposit);
+            let faces = vessel.faces(deposit);
             let thickness = vec![RADII[1] - RADII[0]; faces.len()];
-            let cells = Cells::membrane(faces, &own.model.rest, &thickness);
+            let cells = Cells::membrane(faces, &vessel.model.rest, &thickness);
             let material = Material::elastic(neo_hookean(WALL[0]), 1000.0);
-            own.model.add_solid("wall", Solid::new(0, material, cells))?;
+            vessel.model.add_solid("wall", Solid::new(0, material, cells))?;
         }
-        own.prescribe(0, |[i, _, _]| i == around);
-        own.prescribe(1, |[i, _, _]| i == 0);
-        let last = own.along;
-        own.prescribe(2, |[_, _, k]| k == 0 || k == last);
-        Ok(own)
+        vessel.prescribe(0, |[i, _, _]| i == around);
+        vessel.prescribe(1, |[i, _, _]| i == 0);
+        let last = vessel.along;
+        vessel.prescribe(2, |[_, _, k]| k == 0 || k == last);
+        Ok(vessel)
     }
 
     fn node(&self, [i, j, k]: [u32; 3]) -> u32 {
@@ -169,8 +169,9 @@ impl Vessel {
     fn prescribe(&mut self, component: usize, on: impl Fn([u32; 3]) -> bool) {
         let mut components = [false; 6];
         components[component] = true;
-        let all = triples([self.along + 1, self.layers[1] + 1, self.around + 1]).map(|(k, j, i)| [i, j, k]);
-        let nodes = all.filter(|&at| on(at)).map(|at| self.node(at)).collect();
+        let lattice =
+            triples([self.along + 1, self.layers[1] + 1, self.around + 1]).map(|(k, j, i)| [i, j, k]);
+        let nodes = lattice.filter(|&at| on(at)).map(|at| self.node(at)).collect();
         let name = ["x", "y", "z"][component].into();
         self.model.model_mut().constraints.push(Constraint {
             name,
@@ -277,11 +278,14 @@ pub fn exact(young: f64) -> Vec<Widened> {
 pub(crate) fn exact_at(rows: &[Widened], inner: f64) -> Widened {
     let after = rows.partition_point(|row| row.inner < inner);
     let first = after.saturating_sub(1).min(rows.len().saturating_sub(3));
-    let own = &rows[first..first + 3];
+    let nearest = &rows[first..first + 3];
     let weight = |i: usize| -> f64 {
-        (0..3).filter(|&j| j != i).map(|j| (inner - own[j].inner) / (own[i].inner - own[j].inner)).product()
+        (0..3)
+            .filter(|&j| j != i)
+            .map(|j| (inner - nearest[j].inner) / (nearest[i].inner - nearest[j].inner))
+            .product()
     };
-    let mean = |of: Quantity| (0..3).map(|i| weight(i) * of(&own[i])).sum();
+    let mean = |of: Quantity| (0..3).map(|i| weight(i) * of(&nearest[i])).sum();
     Widened {
         inner,
         displacements: [mean(|row| row.displacements[0]), mean(|row| row.displacements[1])],
@@ -299,28 +303,28 @@ fn compute() -> Result<Findings, CaseError> {
     let found = widened(divisions, DEPOSIT, &radii)?;
     let rows = exact(DEPOSIT);
     let mut findings = Findings::default();
-    for (own, radius) in found.iter().zip(&radii).skip(1).step_by(2) {
-        let wanted = exact_at(&rows, own.inner);
-        for (what, wanted, own) in [
-            ("displacement of the outer wall", wanted.displacements[0], own.displacements[0]),
-            ("displacement between deposit and wall", wanted.displacements[1], own.displacements[1]),
-            ("force", wanted.force, own.force),
+    for (stage, radius) in found.iter().zip(&radii).skip(1).step_by(2) {
+        let wanted = exact_at(&rows, stage.inner);
+        for (what, wanted, value) in [
+            ("displacement of the outer wall", wanted.displacements[0], stage.displacements[0]),
+            ("displacement between deposit and wall", wanted.displacements[1], stage.displacements[1]),
+            ("force", wanted.force, stage.force),
         ] {
             let quantity = format!("balloon of {:.2} mm: {what}, deviation", 1e3 * radius);
-            findings.rows.push(Row::deviation(quantity, 0.05, (own / wanted - 1.0).abs(), SOURCE));
+            findings.rows.push(Row::deviation(quantity, 0.05, (value / wanted - 1.0).abs(), SOURCE));
         }
     }
     // The thesis's wall is a shell. A thin wall at the outside of the deposit is stiffer than a thick wall
     // around the deposit.
     let thin = Divisions { through: [divisions.through[0], 0], ..divisions };
-    for (own, radius) in widened(thin, DEPOSIT, &radii)?.iter().zip(&radii).skip(7) {
-        let wanted = exact_at(&rows, own.inner);
-        for (what, wanted, own) in [
-            ("displacement between deposit and wall", wanted.displacements[1], own.displacements[1]),
-            ("force", wanted.force, own.force),
+    for (stage, radius) in widened(thin, DEPOSIT, &radii)?.iter().zip(&radii).skip(7) {
+        let wanted = exact_at(&rows, stage.inner);
+        for (what, wanted, value) in [
+            ("displacement between deposit and wall", wanted.displacements[1], stage.displacements[1]),
+            ("force", wanted.force, stage.force),
         ] {
             let quantity = format!("balloon of {:.2} mm, thin wall: {what}, deviation", 1e3 * radius);
-            findings.rows.push(Row::shown(quantity, "", own / wanted - 1.0, SOURCE));
+            findings.rows.push(Row::shown(quantity, "", value / wanted - 1.0, SOURCE));
         }
     }
     let curve = |name: &str, colour, pen, rows: &[Widened], of: Quantity| {
@@ -370,16 +374,16 @@ mod tests {
     fn off(divisions: Divisions, young: f64, radii: &[f64]) -> f64 {
         let rows = exact(young);
         let found = widened(divisions, young, radii).unwrap();
-        largest(found.iter().map(|own| {
-            let wanted = exact_at(&rows, own.inner);
+        largest(found.iter().map(|stage| {
+            let wanted = exact_at(&rows, stage.inner);
             let parts = [
-                own.displacements[0] / wanted.displacements[0] - 1.0,
-                own.displacements[1] / wanted.displacements[1] - 1.0,
-                own.force / wanted.force - 1.0,
+                stage.displacements[0] / wanted.displacements[0] - 1.0,
+                stage.displacements[1] / wanted.displacements[1] - 1.0,
+                stage.force / wanted.force - 1.0,
             ];
             let [outer, between, force] = parts.map(|part| 100.0 * part);
-            let inner = 1e3 * own.inner;
-            println!("{inner:.4} mm: outer {outer:+.2} %, between {between:+.2} %, force {force:+.2} %, {} iterations", own.iterations);
+            let inner = 1e3 * stage.inner;
+            println!("{inner:.4} mm: outer {outer:+.2} %, between {between:+.2} %, force {force:+.2} %, {} iterations", stage.iterations);
             largest(parts.map(f64::abs))
         }))
     }

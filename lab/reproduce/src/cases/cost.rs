@@ -12,7 +12,7 @@ use pliant_meshing::VolumeCell;
 use serde_json::json;
 
 use crate::case::{Case, CaseError, Correction, Findings, Row};
-use crate::cases::told;
+use crate::cases::adapter_name;
 use crate::plot::{Curve, Key, Pen, Plot};
 use crate::{Specimen, elastic, law, liver, liver_matrix, liver_relaxation};
 
@@ -188,7 +188,7 @@ fn compute() -> Result<Findings, CaseError> {
     match Device::open(None) {
         Ok(device) => {
             let adapter = device.adapter();
-            let detail = format!(" ({})", told(adapter));
+            let detail = format!(" ({})", adapter_name(adapter));
             let on_device = Series::measure("GPU", detail, Some(&device))?;
             on_device.add_figures(&mut findings)?;
             on_device.add_rows(&mut findings);

@@ -159,8 +159,8 @@ fn resultants_off(
     [(sum - force).norm() / force.norm(), (moment - place.cross(&force)).norm() / (force.norm() * edge)]
 }
 
-fn split(all: &SVector<f64, 18>) -> [[Vector3; 2]; 3] {
-    std::array::from_fn(|i| [0, 3].map(|c| Vector3::from_fn(|r, _| all[6 * i + c + r])))
+fn split(values: &SVector<f64, 18>) -> [[Vector3; 2]; 3] {
+    std::array::from_fn(|i| [0, 3].map(|c| Vector3::from_fn(|r, _| values[6 * i + c + r])))
 }
 
 /// An arrow as triangles: a shaft and a head.
@@ -434,12 +434,12 @@ fn with_gaps(ball: &Ellipsoid, Picture { places, triangles, .. }: &Picture) -> M
     let (mut points, mut cut) = (Vec::new(), Vec::new());
     for facet in 0..ball.model.facets.len() {
         let deflected = ball.deflected(facet);
-        let mut own = std::collections::BTreeMap::new();
+        let mut known = std::collections::BTreeMap::new();
         for triangle in triangles {
             let weights = triangle.map(|at| weights_in(&ball.model, &places[at as usize], facet));
             let [Some(a), Some(b), Some(c)] = weights else { continue };
             cut.push([a, b, c].map(|w| {
-                *own.entry(w.map(f64::to_bits)).or_insert_with(|| {
+                *known.entry(w.map(f64::to_bits)).or_insert_with(|| {
                     points.push(deflected.point(w));
                     points.len() as u32 - 1
                 })
@@ -505,8 +505,8 @@ fn rendering() -> Result<Findings, CaseError> {
 /// The area coordinates of a place in a facet, if it belongs to the facet; places on edges belong to both
 /// facets.
 fn weights_in(model: &Assembly, place: &Place, facet: usize) -> Option<[f64; 3]> {
-    let (own, nodes) = (model.facets[place.facet as usize].nodes, model.facets[facet].nodes);
-    let weighed = own.iter().zip(place.weights).filter(|(_, w)| *w > 0.0);
+    let (place_nodes, nodes) = (model.facets[place.facet as usize].nodes, model.facets[facet].nodes);
+    let weighed = place_nodes.iter().zip(place.weights).filter(|(_, w)| *w > 0.0);
     let mut weights = [0.0; 3];
     for (node, w) in weighed {
         weights[nodes.iter().position(|n| n == node)?] = w;

@@ -93,9 +93,9 @@ fn mesh() -> Result<Findings, CaseError> {
     let mesh = &built.bodies[0].mesh;
     let source = "Table 8.2 and section 8.5";
     let mut findings = Findings::default();
-    let count = |name: &str, printed: f64, own: usize| Row {
+    let count = |name: &str, printed: f64, found: usize| Row {
         reference: Some(printed),
-        ..Row::shown(name, "", own as f64, source)
+        ..Row::shown(name, "", found as f64, source)
     };
     findings.rows.push(count("nodes", 473.0, mesh.points.len()));
     findings.rows.push(count("triangles", 743.0, triangles(mesh).count()));
@@ -135,12 +135,12 @@ impl Way {
     fn look(&mut self, frame: &Frame<'_>) {
         let points = self.points(frame);
         let now = areas(&self.mesh, &points);
-        let all: f64 = self.rest.iter().sum();
-        self.whole = self.whole.max((now.iter().sum::<f64>() / all - 1.0).abs());
+        let rest_area: f64 = self.rest.iter().sum();
+        self.whole = self.whole.max((now.iter().sum::<f64>() / rest_area - 1.0).abs());
         let changes = || now.iter().zip(&self.rest).map(|(now, rest)| (now / rest - 1.0).abs());
         self.triangle = self.triangle.max(largest(changes()));
         let beyond = changes().zip(&self.rest).filter(|(change, _)| *change > 0.05).map(|(_, rest)| rest);
-        self.beyond = self.beyond.max(beyond.sum::<f64>() / all);
+        self.beyond = self.beyond.max(beyond.sum::<f64>() / rest_area);
         if self.left.is_none() && points.iter().all(|x| x.y > TUBE_END) {
             self.left = Some(frame.time());
         }

@@ -104,14 +104,14 @@ fn compute() -> Result<Findings, CaseError> {
     let cells = &built.model.solids[0].cells;
     let mean = |stress: &[f64]| {
         let volume = |cell: usize| cells.volume(cell);
-        let all: f64 = (0..cells.len()).map(volume).sum();
-        stress.iter().enumerate().map(|(cell, s)| volume(cell) * s).sum::<f64>() / all
+        let total: f64 = (0..cells.len()).map(volume).sum();
+        stress.iter().enumerate().map(|(cell, s)| volume(cell) * s).sum::<f64>() / total
     };
     // 1 %: three seconds after the pull e^(−3/0.58) = 0.6 % of the relaxing stress is left.
     let source = "elastic equilibrium with half of μ and η, by dynamic relaxation";
     let most = |stretched: &Stretched| largest(stretched.stress.iter().copied());
-    let told = |stretched: &Stretched| [most(stretched), mean(&stretched.stress), stretched.force];
-    let [before, after, limit] = [&elastic, &relaxed, &long_after].map(told);
+    let numbers = |stretched: &Stretched| [most(stretched), mean(&stretched.stress), stretched.force];
+    let [before, after, limit] = [&elastic, &relaxed, &long_after].map(numbers);
     for (which, (name, unit)) in
         [("largest von Mises stress", "Pa"), ("mean von Mises stress", "Pa"), ("force on the lobe", "N")]
             .into_iter()

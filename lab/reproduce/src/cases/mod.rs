@@ -48,7 +48,7 @@ pub const CASES: &[Case] = &[
 ];
 
 /// The name of an adapter, marked if it is software.
-fn told(adapter: &Adapter) -> String {
+fn adapter_name(adapter: &Adapter) -> String {
     let software = if adapter.kind == Kind::Software { ", run by the CPU" } else { "" };
     format!("{}{software}", adapter.name)
 }

@@ -92,10 +92,10 @@ pub fn cook(cells: usize, formulation: Formulation) -> Result<f64, CaseError> {
         let (s, t) = (p.x, p.y);
         (p.x, p.y) = (48.0 * s, 44.0 * s + t * (44.0 - 28.0 * s));
     }
-    let all = (0..mesh.points.len() as u32).collect();
+    let every_node = (0..mesh.points.len() as u32).collect();
     let cook = Specimen::new(mesh, [1.0, 1.0 / 3.0], 1.0, formulation)?
         .prescribe_edge("x-min", CLAMPED)
-        .prescribe(all, [false, false, true, true, true, false])
+        .prescribe(every_node, [false, false, true, true, true, false])
         .pull_edge("x-max", [0.0, 1.0, 0.0]);
     let middle = cook.node(48.0, 52.0, 0.0);
     Ok(cook.linear(middle)?[1] / 23.96)

@@ -14,7 +14,7 @@ use pliant_scene::World;
 
 use crate::CaseError;
 use crate::case::{Case, Findings, Row};
-use crate::cases::told;
+use crate::cases::adapter_name;
 use crate::picture::{Body, View, figure};
 
 /// Figure 6.8.
@@ -125,7 +125,7 @@ fn compute() -> Result<Findings, CaseError> {
     cube.add_rows(&mut findings, "cube, all cores", 1.0);
     match Device::open(None) {
         Ok(device) => {
-            let name = format!("cube, GPU ({})", told(device.adapter()));
+            let name = format!("cube, GPU ({})", adapter_name(device.adapter()));
             play(CUBE, 1.0, &[(&["run", "device"], "gpu".into())])?.add_rows(&mut findings, &name, 1.0);
         }
         Err(GpuError::NoAdapter) => {}

@@ -182,21 +182,21 @@ fn elastic_figure(
     expected: &[Vec<f64>; 4],
     found: &[Symmetric<f64>],
 ) -> Result<Figure, CaseError> {
-    let mut all = Vec::new();
+    let mut curves = Vec::new();
     for (component, name) in ["S₁₁", "S₂₂", "S₃₃", "S₁₂"].into_iter().enumerate() {
-        all.push(Curve::new(name, component, Pen::Line, points(expected[component].iter().copied())));
+        curves.push(Curve::new(name, component, Pen::Line, points(expected[component].iter().copied())));
         let stresses = found.iter().map(|s| s.0[component]);
-        all.push(Curve::new("", component, Pen::Markers, points(stresses)));
+        curves.push(Curve::new("", component, Pen::Markers, points(stresses)));
     }
     let (axes, key) = (["shear γ", "stress S [kPa]"], Key::LowerLeft);
-    let plot = Plot { title, axes, logarithmic: false, key, curves: &all };
+    let plot = Plot { title, axes, logarithmic: false, key, curves: &curves };
     plot.figure("Lines: analytic. Circles: one element.")
 }
 
 fn viscoelastic() -> Result<Findings, CaseError> {
     let data = data();
     let mut findings = Findings::default();
-    let mut all = Vec::new();
+    let mut drawn_curves = Vec::new();
     let bounds = [("∞", "instantaneous", None), ("0⁺", "equilibrium", Some(Rate::Vanishing))];
     let [infinite, vanishing] = bounds;
     let rates = RATES.map(|rate| (format!("{rate}/s"), rate_name(rate), Some(Rate::At(rate))));
@@ -208,8 +208,8 @@ fn viscoelastic() -> Result<Findings, CaseError> {
             Some(rate) => sheared("energy", liver_relaxation(PronyUpdate::Exact), rate)?,
             None => sheared("energy", Prony::default(), Rate::At(RATES[0]))?,
         };
-        all.push(Curve::new(name.clone(), colour, Pen::Line, points(expected.iter().copied())));
-        all.push(Curve::new("", colour, Pen::Markers, points(found.iter().map(|s| s.0[0]))));
+        drawn_curves.push(Curve::new(name.clone(), colour, Pen::Line, points(expected.iter().copied())));
+        drawn_curves.push(Curve::new("", colour, Pen::Markers, points(found.iter().map(|s| s.0[0]))));
         let limit = if matches!(rate, Some(Rate::At(_))) { 3e-5 } else { 1e-9 };
         let quantity = format!("rate {name}: S₁₁ over γ = 0 … 1, largest deviation over the largest value");
         findings.rows.push(Row::deviation(quantity, limit, off(expected, &found, 0), SOURCE));
@@ -225,8 +225,13 @@ fn viscoelastic() -> Result<Findings, CaseError> {
         findings.rows.push(Row::deviation(quantity, limit, (found / expected - 1.0).abs(), SOURCE));
     }
     let axes = ["shear γ", "stress S₁₁ [kPa]"];
-    let plot =
-        Plot { title: "S₁₁, rates in 1/s", axes, logarithmic: false, key: Key::UpperLeft, curves: &all };
+    let plot = Plot {
+        title: "S₁₁, rates in 1/s",
+        axes,
+        logarithmic: false,
+        key: Key::UpperLeft,
+        curves: &drawn_curves,
+    };
     findings.figures.push(plot.figure("Lines: analytic. Circles: one element, steps of 0.01 s.")?);
     Ok(findings)
 }
