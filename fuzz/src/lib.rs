@@ -6,7 +6,7 @@
 //! has AFL++ look for others.
 //!
 //! ```
-//! let read = |name| pliant_fuzz::DOORS.iter().find(|(own, _)| *own == name).unwrap().1;
+//! let read = |name| pliant_fuzz::DOORS.iter().find(|(known, _)| *known == name).unwrap().1;
 //! read("scene")(b"[scene]\nuntil = nonsense");
 //! read("datagram")(b"nothing");
 //! ```
@@ -129,9 +129,9 @@ pub fn seeds(door: &str) -> Result<Vec<Vec<u8>>, Box<dyn Error>> {
         "mesh" | "surface" => files("geometry/tests/data", "")?,
         "niftysim" => files("run/tests/corpus", "xml")?,
         "scene" => {
-            let mut all = files("run/tests/corpus", "toml")?;
-            all.push(BLOCK.into());
-            all
+            let mut scenes = files("run/tests/corpus", "toml")?;
+            scenes.push(BLOCK.into());
+            scenes
         }
         "trace" => vec![
             b"t,x,y,z,qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n0.5,0.01,0,0.02,0.7071,0.7071,0,0\n1,0,0,0,1,0,0,0\n"
@@ -149,9 +149,9 @@ fn files(folder: &str, ending: &str) -> io::Result<Vec<Vec<u8>>> {
         fs::read_dir(folder)?.map(|entry| entry.map(|entry| entry.path())).collect::<Result<_, _>>()?;
     paths.retain(|path| path.is_file() && path.to_string_lossy().ends_with(ending));
     paths.sort();
-    let mut all = paths.iter().map(fs::read).collect::<io::Result<Vec<_>>>()?;
-    all.retain(|bytes| bytes.len() <= LONGEST);
-    Ok(all)
+    let mut contents = paths.iter().map(fs::read).collect::<io::Result<Vec<_>>>()?;
+    contents.retain(|bytes| bytes.len() <= LONGEST);
+    Ok(contents)
 }
 
 fn checkpoint(bytes: &[u8]) {

@@ -22,13 +22,13 @@ fn write_seeds(door: &str, folder: &Path) -> Result<(), Box<dyn Error>> {
 
 fn main() {
     let name = std::env::args().nth(1).unwrap_or_default();
-    let Some((_, door)) = DOORS.iter().find(|(own, _)| *own == name) else {
+    let Some((_, door)) = DOORS.iter().find(|(known, _)| *known == name) else {
         let names: Vec<&str> = DOORS.iter().map(|(name, _)| *name).collect();
         eprintln!("error: `{name}` is no door; these are: {}", names.join(", "));
         std::process::exit(2);
     };
     // `door NAME --seeds DIR` writes the first inputs for AFL++.
-    if let Some(folder) = std::env::args().skip_while(|own| own != "--seeds").nth(1) {
+    if let Some(folder) = std::env::args().skip_while(|argument| argument != "--seeds").nth(1) {
         write_seeds(&name, folder.as_ref()).unwrap_or_else(|error| panic!("{error}"));
         return;
     }
