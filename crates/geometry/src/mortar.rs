@@ -52,7 +52,7 @@ pub struct MortarRow {
     /// Nodes of the other side with their weights.
     pub followed: Vec<(u32, f64)>,
     /// Nodes of its own side that are not tied, with their weights. All weights of both sides sum to 1.
-    pub own: Vec<(u32, f64)>,
+    pub free: Vec<(u32, f64)>,
     /// The place of the node less the place that its weights give [m]: zero up to round-off where both
     /// surfaces are flat.
     pub offset: Vector3,
@@ -143,12 +143,12 @@ impl Sums {
             let weights = sums.into_iter().map(|(node, sum)| (node, sum / self.diagonal));
             weights.filter(|(_, weight)| weight.abs() > TINY).collect()
         };
-        let (followed, untied) = (over(self.followed), over(self.untied));
+        let (followed, free) = (over(self.followed), over(self.untied));
         let reached = |weights: &[(u32, f64)], points: &[Vector3]| -> Vector3 {
             weights.iter().map(|&(node, weight)| points[node as usize] * weight).sum()
         };
-        let offset = own_points[node as usize] - reached(&followed, points) - reached(&untied, own_points);
-        MortarRow { node, followed, own: untied, offset }
+        let offset = own_points[node as usize] - reached(&followed, points) - reached(&free, own_points);
+        MortarRow { node, followed, free, offset }
     }
 }
 
@@ -439,7 +439,7 @@ mod tests {
                 let given = nodal_areas(&mine, &below);
                 let mut taken = vec![0.0; above.points.len()];
                 for row in &found.rows {
-                    assert!(row.own.is_empty() && row.offset.norm() < 1e-13, "{name}: {row:?}");
+                    assert!(row.free.is_empty() && row.offset.norm() < 1e-13, "{name}: {row:?}");
                     let sum: f64 = row.followed.iter().map(|(_, weight)| weight).sum();
                     assert!((sum - 1.0).abs() < 1e-13, "{name}: {sum}");
                     for &(node, weight) in &row.followed {
@@ -474,12 +474,12 @@ mod tests {
             let mut taken = vec![0.0; above.points.len()];
             let mut beyond = 0.0;
             for row in &found.rows {
-                let sum: f64 = row.followed.iter().chain(&row.own).map(|(_, weight)| weight).sum();
+                let sum: f64 = row.followed.iter().chain(&row.free).map(|(_, weight)| weight).sum();
                 assert!((sum - 1.0).abs() < 1e-12 && row.offset.norm() < 1e-12, "{row:?}");
-                assert!(row.own.iter().all(|&(node, _)| !tied(node)));
+                assert!(row.free.iter().all(|&(node, _)| !tied(node)));
                 let largest = row.followed.iter().map(|(_, w)| w.abs()).fold(0.0, f64::max);
                 assert!(largest < 4.0, "{row:?}");
-                beyond += row.own.iter().map(|(_, weight)| weight).sum::<f64>();
+                beyond += row.free.iter().map(|(_, weight)| weight).sum::<f64>();
                 // D_a is the force on the tied node of a unit stress on the common area.
                 let given = common_area_of(row.node, &mine, &below, &yours, &above);
                 row.followed.iter().for_each(|&(node, w)| taken[node as usize] += w * given);

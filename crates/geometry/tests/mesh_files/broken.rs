@@ -178,7 +178,7 @@ pub(super) fn wedges_and_pyramids_are_read_as_tets_that_fit() {
         let area = boundary(mesh).area(&mesh.points);
         assert!((area - (1.0 + 12.0 + 5.0_f64.sqrt())).abs() < 1e-12, "{name}: {area}");
         let notes = file.notes.join("; ");
-        assert!(notes.contains("split into tets: 2 wedges, 1 pyramid, 1 hex"), "{name}: {notes}");
+        assert!(notes.contains("split into tets: 2 wedges, 1 pyramid, 1 adjacent hex"), "{name}: {notes}");
     }
 }
 

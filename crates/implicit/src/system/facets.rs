@@ -47,7 +47,7 @@ impl Facets {
     pub(super) fn new(model: &Assembly) -> Self {
         let arch = Arch::new();
         Self {
-            packs: FacetPack::all(arch, &model.facets, |node| model.place(node as usize)),
+            packs: FacetPack::packed(arch, &model.facets, |node| model.place(node as usize)),
             arch,
             pressure: vec![Pressure::default(); model.facets.len()],
             surface: needs_surface(model).then(|| CurvedSurface::new(model, EdgeRule::Arc)),

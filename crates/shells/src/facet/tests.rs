@@ -141,7 +141,7 @@ fn packs_have_forces_and_stiffness_of_single_facets() {
         let orders = [[0, 1, 2], [1, 2, 0], [2, 0, 1]];
         let facets: Vec<Facet> =
             (0..11).map(|k| facet(orders[k % 3]).under_tension(10.0 * k as f64)).collect();
-        let packs = FacetPack::all(Arch::new(), &facets, |node| rest()[node as usize]);
+        let packs = FacetPack::packed(Arch::new(), &facets, |node| rest()[node as usize]);
         for (pack, chunk) in packs.iter().zip(facets.chunks(PACK)) {
             let mut work = Work::new();
             let poses: Vec<Pose> = chunk.iter().map(|_| pose(&mut random, size)).collect();
@@ -265,7 +265,7 @@ fn packs_at_rest_have_no_deformation_at_all() {
     for _ in 0..20 {
         let (corners, _) = pose(&mut random, 1.0);
         let facet = Facet::new([0, 1, 2], corners, 0.1, MATERIAL, Formulation::default()).unwrap();
-        let packs = FacetPack::all(Arch::new(), &[facet], |node| corners[node as usize]);
+        let packs = FacetPack::packed(Arch::new(), &[facet], |node| corners[node as usize]);
         let mut work = Work::new();
         work.put(0, &corners, &[UnitQuaternion::identity(); 3]);
         work.find(Arch::new(), &packs[0], 1, false);
@@ -285,7 +285,7 @@ fn packs_find_what_is_broken_and_nothing_else() {
     let poses = [(x, negative), (flat, none), ([a, c, b], none), (nowhere, none)];
     let mut work = Work::new();
     poses.iter().enumerate().for_each(|(lane, (x, turn))| work.put(lane, x, turn));
-    let packs = FacetPack::all(Arch::new(), &facets, |node| rest()[node as usize]);
+    let packs = FacetPack::packed(Arch::new(), &facets, |node| rest()[node as usize]);
     work.find(Arch::new(), &packs[0], 4, true);
     let whole = evaluate(&facets[0], &(x, rotation)).1;
     assert!((work.force(0).1 - whole).amax() < 1e-12 * whole.amax());

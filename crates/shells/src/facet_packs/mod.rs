@@ -46,7 +46,7 @@ pub struct FacetPack {
 
 impl FacetPack {
     /// Facets in their order, with the positions [m] of nodes at rest.
-    pub fn all(arch: Arch, facets: &[Facet], rest: impl Fn(u32) -> Vector3<f64>) -> Vec<Self> {
+    pub fn packed(arch: Arch, facets: &[Facet], rest: impl Fn(u32) -> Vector3<f64>) -> Vec<Self> {
         let mut work = Work::new();
         facets.chunks(PACK).map(|facets| Self::of(arch, facets, &rest, &mut work)).collect()
     }

@@ -102,7 +102,7 @@ impl Meshed<'_> {
             return Err(Refusal { message, label: "no faces", help });
         }
         let has_other = |(other, tie): &&(String, TieTable)| other != name && tie.between.contains(&names[0]);
-        if found.rows.iter().any(|row| !row.own.is_empty())
+        if found.rows.iter().any(|row| !row.free.is_empty())
             && let Some((other, _)) = self.scene.ties.iter().find(has_other)
         {
             let message = format!(
@@ -184,7 +184,7 @@ impl Meshed<'_> {
         let [guest_body, other] = [guest, host].map(|body| &self.assembly.bodies[body]);
         let mesh = &self.bodies[host].mesh;
         let (locator, rounding) = (Locator::new(mesh), ROUNDING * median_edge(mesh));
-        let in_model = |MortarRow { node, followed, own: apart, offset }: &MortarRow| {
+        let in_model = |MortarRow { node, followed, free, offset }: &MortarRow| {
             let mut row: Vec<(u32, f64)> = followed.iter().map(|&(node, w)| (other.node(node), w)).collect();
             let place = Vector3::from(self.assembly.rest[guest_body.node(*node) as usize]);
             if offset.norm() > rounding {
@@ -202,7 +202,7 @@ impl Meshed<'_> {
                 }
                 row.retain(|(_, weight)| *weight != 0.0);
             }
-            row.extend(apart.iter().map(|&(node, w)| (guest_body.node(node), w)));
+            row.extend(free.iter().map(|&(node, w)| (guest_body.node(node), w)));
             row
         };
         let rows: Vec<Vec<(u32, f64)>> = found.rows.iter().map(in_model).collect();
