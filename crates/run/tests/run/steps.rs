@@ -379,7 +379,7 @@ fn load_steps_that_are_not_as_asked_or_not_equal_are_told() {
     }
     let controlled = "solver = \"static\"\nload-steps = { times = [0.4] }\ncontrol = { load = \"pull\", arc-length = 0.1 }";
     let output = Workshop::new(&bent("hex8", controlled)).run(&[]);
-    assert!(output.status() == "invalid" && output.err.contains("equal parts"), "{}", output.err);
+    assert!(output.status() == "invalid" && output.err.contains("equal load steps"), "{}", output.err);
 }
 
 #[test]

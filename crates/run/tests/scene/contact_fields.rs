@@ -152,10 +152,10 @@ fn a_gap_that_is_small_for_the_elements_is_noted() {
             &format!("{{ file = '{}' }}", file.display()),
         );
         let world = world(&text.replace("0.0301]", "0.05]")).unwrap();
-        world.notes().find(|note| note.contains("contact `itself`: a gap of")).cloned()
+        world.notes().find(|note| note.contains("contact `itself`: the gap of")).cloned()
     };
     let note = legs(5e-4).unwrap();
-    assert!(note.contains("a gap of 5.000e-4 m at (") && note.contains("smaller elements"), "{note}");
+    assert!(note.contains("the gap of 5.000e-4 m at (") && note.contains("smaller elements"), "{note}");
     assert_eq!(legs(0.008), None);
 }
 

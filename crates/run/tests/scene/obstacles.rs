@@ -190,7 +190,10 @@ fn shapes_that_cannot_be_are_refused_with_their_line() {
     let mesh = |file: &str, more: &str| format!("{{ mesh = {{ file = '{file}'{more} }} }}");
     for (shape, pieces) in [
         (mesh("none.stl", ""), ["none.stl", "file names are relative to the scene file"]),
-        (mesh(&file("open.stl", &open), ""), ["the surface is open: 1 hole with 3 border edges", "close it"]),
+        (
+            mesh(&file("open.stl", &open), ""),
+            ["the surface is open: 1 hole with 3 border edges", "close the surface"],
+        ),
         (mesh(&flat, ""), ["encloses nothing", "give a surface around a volume"]),
         (mesh(&file("points.vtu", &points), ""), ["no surface", "triangles, quads, tets or hexes"]),
         (mesh(&file("lines.vtu", &lines), ""), ["no surface", "triangles, quads, tets or hexes"]),

@@ -246,7 +246,7 @@ fn what_encloses_nothing_is_refused_by_name() {
         ("membrane", "solver = 'explicit'", top, "", vec!["leave an opening at", "close"]),
         ("membrane", "solver = 'explicit'", "by = -2e-4", "", vec!["encloses", "`by` removes more"]),
         ("membrane", "solver = 'explicit'", "", "", vec!["by"]),
-        ("shell", "solver = 'explicit'", "by = 1e-5", "", vec!["explicit shells", "`balloon`"]),
+        ("shell", "solver = 'explicit'", "by = 1e-5", "", vec!["no shell can enclose a volume", "`balloon`"]),
         (
             "membrane",
             "solver = 'explicit'",

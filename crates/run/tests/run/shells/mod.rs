@@ -300,7 +300,7 @@ fn a_path_by_arc_length_ends() {
     };
     let (json, curve) = path("");
     assert!(json["steps"].as_u64().unwrap() < 40, "{json}");
-    assert!(json["ended"].as_str().unwrap().contains("at least 1"), "{json}");
+    assert!(json["ended"].as_str().unwrap().contains("limit of ±1.0"), "{json}");
     let [before, last] = [2, 1].map(|back| curve[curve.len() - back][0]);
     assert!(before < 1.0 && last >= 1.0, "{curve:?}");
     let (json, curve) = path(", stop = { load-factor = 0.2 }");

@@ -445,9 +445,12 @@ mod tests {
     fn lost_directions_are_told_with_their_cells() {
         let hexes = format!("{BLOCK}, as = 'hexes'");
         let says = refused(&hexes, "{ toward = [0.005, 0.005, 0.005] }");
-        assert!(says.contains("toward: hex 0 (counted from 0) (help: move the point off"), "{says}");
+        assert!(
+            says.contains("point of `toward`: hex 0 (counted from 0) (help: move the point off"),
+            "{says}"
+        );
         let says = refused(&hexes, "{ around = { point = [0.005, 0.005, 0], axis = [0, 0, 1] } }");
-        assert!(says.contains("turn around: hex 0, hex 16, hex 32, hex 48"), "{says}");
+        assert!(says.contains("axis of `around`: hex 0, hex 16, hex 32, hex 48"), "{says}");
         let rule = "{ tangential = { surface = { set = 'z-max' }, closest-to = [0, 0, 1] } }";
         let says = refused(&hexes, rule);
         assert!(says.contains("perpendicular to the surface: hex 0, hex 1,"), "{says}");

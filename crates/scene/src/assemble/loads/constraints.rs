@@ -412,7 +412,7 @@ mod tests {
             ("type = 'move'", "exactly one of `by`, `velocity` and `rotate`, found neither"),
             (
                 "type = 'move'\nby = [0, 0, 1]\nrotate = { axis = [0, 0, 1], centre = [0, 0, 0], angle = 1 }",
-                "`by` does not go with it",
+                "so `by` cannot be used with it",
             ),
             (
                 "type = 'move'\nrotate = { axis = [0, 0, 0], centre = [0, 0, 0], angle = 1 }",
@@ -420,7 +420,7 @@ mod tests {
             ),
             (
                 "type = 'move'\ncomponents = ['x']\nrotate = { axis = [0, 0, 1], centre = [0, 0, 0], angle = 1 }",
-                "`components` does not go with it",
+                "so `components` cannot be used with it",
             ),
             ("type = 'move'\nby = [0, 0, 1]\nvelocity = [0, 0, 1]", "found both"),
             ("type = 'fix'\ncomponents = []", "`components` is empty"),
@@ -450,7 +450,7 @@ mod tests {
         for (angle, found) in [("", "neither"), (", angle = 1, degrees = 60", "both")] {
             let rotate = format!("rotate = {{ axis = [0, 0, 1], centre = [0, 0, 0]{angle} }}");
             let message = mistakes(&top(&format!("type = 'move'\n{rotate}"))).plain().to_string();
-            assert!(message.contains(&format!("by `angle` or by `degrees`, found {found}")), "{message}");
+            assert!(message.contains(&format!("either `angle` or `degrees`, found {found}")), "{message}");
         }
     }
 
