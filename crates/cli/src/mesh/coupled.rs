@@ -22,22 +22,7 @@ pub fn scene(arguments: &MeshImage) -> Result<u8, Failure> {
     let Some(edge) = arguments.edge else {
         return Err(Failure::plain("the edge of the cells is missing", "for example `--edge 8mm`"));
     };
-    let idle = [
-        (is_mesh_file(arguments), "a scene as output needs images as input"),
-        (
-            !matches!(arguments.cells, MeshCells::Tets),
-            "a scene meshes its tissue with tets: `--as` has no effect",
-        ),
-        (arguments.threshold.is_some(), "`--threshold` is for meshes: a scene needs labels"),
-        (arguments.distance.is_some(), "`--distance` is for meshes"),
-        (arguments.inner_edge.is_some(), "`--inner-edge` is for meshes"),
-        (!arguments.protect.is_empty(), "`--protect` is for meshes"),
-        (arguments.series.is_some(), "`--series` is for meshes"),
-        (arguments.json, "`--json` is for meshes"),
-    ];
-    if let Some((_, message)) = idle.into_iter().find(|(idle, _)| *idle) {
-        return Err(Failure::plain(message, "leave it out, or name a mesh file as output"));
-    }
+    without_effect(arguments)?;
     if arguments.out.exists() && !arguments.force {
         let message = format!("`{}` exists already", arguments.out.display());
         return Err(Failure::plain(message, "choose another name, or overwrite it with `--force`"));
@@ -99,6 +84,27 @@ pub fn scene(arguments: &MeshImage) -> Result<u8, Failure> {
     let out = arguments.out.display();
     say(format_args!("wrote {out}; try: pliant check {out} && pliant run {out}"))?;
     Ok(SUCCESS)
+}
+
+/// Refuses options that have no effect on a scene.
+fn without_effect(arguments: &MeshImage) -> Result<(), Failure> {
+    let idle = [
+        (is_mesh_file(arguments), "a scene as output needs images as input"),
+        (
+            !matches!(arguments.cells, MeshCells::Tets),
+            "a scene meshes its tissue with tets: `--as` has no effect",
+        ),
+        (arguments.threshold.is_some(), "`--threshold` is for meshes: a scene needs labels"),
+        (arguments.distance.is_some(), "`--distance` is for meshes"),
+        (arguments.inner_edge.is_some(), "`--inner-edge` is for meshes"),
+        (!arguments.protect.is_empty(), "`--protect` is for meshes"),
+        (arguments.series.is_some(), "`--series` is for meshes"),
+        (arguments.json, "`--json` is for meshes"),
+    ];
+    match idle.into_iter().find(|(idle, _)| *idle) {
+        Some((_, message)) => Err(Failure::plain(message, "leave it out, or name a mesh file as output")),
+        None => Ok(()),
+    }
 }
 
 /// The image with the vessels inside of the organ as tissue, and their volumes inside and outside [m³]. Masks
