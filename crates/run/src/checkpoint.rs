@@ -489,11 +489,28 @@ pub(crate) struct Checkpoints<'a> {
 }
 
 impl<'a> Checkpoints<'a> {
-    /// For a run that asks for them; `time` is where it starts.
-    pub fn new(world: &World, folder: &'a OutputFolder, time: f64) -> Option<Self> {
+    /// For a run that asks for them; `time` is where it starts. A run that continues another takes the step of
+    /// the first of them, and so the duration that gave this step.
+    pub fn new(
+        world: &World,
+        folder: &'a OutputFolder,
+        time: f64,
+        before: Option<&Checkpoint>,
+    ) -> Option<Self> {
+        let schedule = Self::schedule(world, time)?;
+        let mut origin = Origin::of(world);
+        origin.until = before.map_or(origin.until, |before| before.origin.until);
+        Some(Self { folder, origin, schedule })
+    }
+
+    /// Goes back to an earlier time [s] of the run.
+    pub fn go_back(&mut self, world: &World, time: f64) {
+        self.schedule = Self::schedule(world, time).unwrap_or(self.schedule);
+    }
+
+    fn schedule(world: &World, time: f64) -> Option<Schedule> {
         let every = world.scene.run.checkpoint?.every;
-        let schedule = Schedule::after(every, time, world.step_from(time));
-        Some(Self { folder, origin: Origin::of(world), schedule })
+        Some(Schedule::after(every, time, world.step_from(time)))
     }
 
     /// True if a checkpoint has to be written at an instant.

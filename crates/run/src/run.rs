@@ -232,7 +232,7 @@ impl<'a, 'env> Run<'a, 'env> {
             sampling: before.map_or(sampling, |before| before.sampling),
             watched: before.map_or_else(fresh, |before| before.watched.clone()),
             checks: world.participants.iter().map(check_of).collect(),
-            checkpoints: Checkpoints::new(world, folder, simulation.time()),
+            checkpoints: Checkpoints::new(world, folder, simulation.time(), options.resume),
             rollback: RollbackPoints::new(simulation.setup(), points),
             folder,
             spare,
@@ -316,8 +316,8 @@ impl<'a, 'env> Run<'a, 'env> {
         let (world, path) = (self.world, self.folder.path());
         self.outputs = Outputs::new(world, path, &mut known, Some(&outputs), self.spare).map_err(failed)?;
         self.outputs.remove_later().map_err(failed)?;
-        self.checkpoints = Checkpoints::new(world, self.folder, time);
-        if let Some(checkpoints) = &self.checkpoints {
+        if let Some(checkpoints) = &mut self.checkpoints {
+            checkpoints.go_back(world, time);
             checkpoints.remove_after(steps).map_err(failed)?;
             self.write_checkpoint(simulation)?;
         }

@@ -267,6 +267,10 @@ fn a_longer_until_goes_on_from_the_end() {
     let (_, rows) = automatic.table("out/case/history.csv");
     assert!((rows.last().unwrap()[0] - 0.17).abs() < first.as_f64().unwrap());
     assert!(rows.windows(2).all(|pair| pair[0][0] < pair[1][0]), "times increase");
+    // So it does in a run that is extended again.
+    let third = automatic.resume("out/case", &["scene.until=0.23"]).done();
+    assert_eq!(third["step"], first);
+    assert!(automatic.resume("out/case", &["scene.until=0.23"]).err.contains("the scene ends at 0.23"));
 }
 
 #[test]
