@@ -489,8 +489,8 @@ pub(crate) struct Checkpoints<'a> {
 }
 
 impl<'a> Checkpoints<'a> {
-    /// For a run that asks for them; `time` is where it starts. A run that continues another takes the step of
-    /// the first of them, and so the duration that gave this step.
+    /// For a run that requests checkpoints and starts at `time` [s]. A run that continues another keeps the
+    /// duration from which the first run took its step.
     pub fn new(
         world: &World,
         folder: &'a OutputFolder,
