@@ -29,6 +29,8 @@ use crate::error::HapticsError;
 
 /// Largest number of planes of a model.
 pub const MOST_PLANES: usize = 16;
+/// Least force [N] with a direction: the square of a smaller one loses digits.
+const LEAST_FORCE: f64 = 1e-100;
 /// Longest time [s] between two models.
 const LONGEST_PERIOD: f64 = 1.0;
 
@@ -141,7 +143,7 @@ impl LocalModel {
         let mut planes: Vec<Plane> =
             around.iter().map(|plane| Plane { gap: plane.gap.max(0.0), ..*plane }).collect();
         planes.sort_by(|a, b| a.gap.total_cmp(&b.gap));
-        if let Some(direction) = force.try_normalize(0.0) {
+        if let Some(direction) = force.try_normalize(LEAST_FORCE) {
             planes.truncate(MOST_PLANES - 1);
             // Planes that touch push together.
             let touching = planes.iter().take_while(|plane| plane.gap <= 0.0);
@@ -236,6 +238,10 @@ mod tests {
             let normal = model.planes()[0].normal;
             let push = normal.dot(&force);
             assert!((force - normal * push).norm() <= friction * push + 1e-7, "{across} {friction}");
+        }
+        for power in 1..320 {
+            let force = Vector3::new(0.3, 0.2, 1.0) * 10.0_f64.powi(-power);
+            LocalModel::touching(Vector3::zeros(), force, Matrix3::identity(), 0.3, &[], 0.01).unwrap();
         }
     }
 }

@@ -19,6 +19,9 @@ use crate::model::{LocalModel, MOST_PLANES};
 const PASSES: usize = 50;
 /// Change [N] of the force in a pass at which it is found.
 const FOUND: f64 = 1e-9;
+/// Slip [m] below which friction changes nothing. A slip that decays tick by tick would lose its digits, and its
+/// square become 0.
+const STILL: f64 = 1e-15;
 
 /// The state of a proxy on the planes of a model.
 #[derive(Clone, Debug)]
@@ -57,7 +60,7 @@ impl Proxy {
                 let slip = pulled_to + mobility * force - self.stuck;
                 let slip = slip - normal * normal.dot(&slip);
                 let square = slip.norm_squared();
-                let wanted = match square > 0.0 {
+                let wanted = match square > STILL * STILL {
                     true => self.drag[i] - slip * (square / slip.dot(&(mobility * slip))),
                     false => self.drag[i],
                 };
@@ -116,6 +119,18 @@ mod tests {
         // Back by less than it takes to let go.
         let back = proxy.force(&wall, Vector3::new(0.0995, 0.0, -0.003), K);
         assert!((back - slide - Vector3::x() * 0.0005 * series).norm() < 1e-9, "{back}");
+    }
+
+    /// A tool that leaves a wall slips by less and less, down to numbers whose squares are 0.
+    #[test]
+    fn a_slip_that_dies_away_gives_finite_forces() {
+        let wall = Matrix3::identity() / 500.0;
+        let wall = model(wall, &[Plane { normal: Vector3::z(), gap: 0.0, friction: 0.4 }]);
+        for power in 1..320 {
+            let mut proxy = Proxy::new(Vector3::new(10.0_f64.powi(-power), 0.0, 0.0));
+            let force = proxy.force(&wall, Vector3::new(0.0, 0.0, -0.003), K);
+            assert!(force.iter().all(|x| x.is_finite()) && force.z > 0.9, "1e-{power} m: {force}");
+        }
     }
 
     /// Conditions of the solution, not the way to it, on wedges at random.
