@@ -591,6 +591,11 @@ fn syntax_error(error: &toml::de::Error, text: &str) -> Diagnostic {
             .at(span, "a text needs quotes")
             .help(format!("write \"{found}\""));
     }
+    if let Some((word, at)) = unquoted(text, span.start) {
+        return Diagnostic::error(format!("`{word}` is not a value"))
+            .at(at, "a text needs quotes")
+            .help(format!("write \"{word}\""));
+    }
     let diagnostic = Diagnostic::error(format!("not valid TOML: {message}")).at(span, "here");
     let (digit_before, digit_after) = (
         before.ends_with(|c: char| c.is_ascii_digit()),
@@ -614,6 +619,19 @@ fn syntax_error(error: &toml::de::Error, text: &str) -> Diagnostic {
     } else {
         diagnostic
     }
+}
+
+/// A word without quotes that is the whole value of the line with a mistake, and its place.
+fn unquoted(text: &str, at: usize) -> Option<(&str, Range<usize>)> {
+    let start = text.get(..at)?.rfind('\n').map_or(0, |end| end + 1);
+    let line = text[start..].lines().next()?;
+    let (key, value) = line.split_once('=')?;
+    let word = value.split('#').next()?.trim();
+    let is_word = word.starts_with(char::is_alphabetic)
+        && word.chars().all(|c| c.is_alphanumeric() || "-_./".contains(c));
+    let begin = start + key.len() + 1 + value.find(word)?;
+    (is_word && at >= begin && !["true", "false", "inf", "nan"].contains(&word))
+        .then(|| (word, begin..begin + word.len()))
 }
 
 /// True if the text breaks off in an escape of a text in double quotes.

@@ -19,8 +19,8 @@ use crate::model::{LocalModel, MOST_PLANES};
 const PASSES: usize = 50;
 /// Change [N] of the force in a pass at which it is found.
 const FOUND: f64 = 1e-9;
-/// Slip [m] below which friction changes nothing. A slip that decays tick by tick would lose its digits, and its
-/// square become 0.
+/// Slip [m] below which friction changes nothing. A slip that decays tick by tick would lose its digits, and
+/// its square become 0.
 const STILL: f64 = 1e-15;
 
 /// The state of a proxy on the planes of a model.

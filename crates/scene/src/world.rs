@@ -92,11 +92,29 @@ impl World {
         world.check_ties(&mut found);
         world.check_coupled_surfaces(&mut found);
         world.check_view(&mut found);
+        world.check_rigid_things(&mut found);
         if found.iter().any(Diagnostic::is_error) {
             return Err(scene.source.errors(found));
         }
         found.into_iter().for_each(|doubt| world.doubt(doubt));
         Ok(world)
+    }
+
+    /// Warns of obstacles and tools that no contact names.
+    fn check_rigid_things(&self, found: &mut Vec<Diagnostic>) {
+        let scene = &self.scene;
+        let is_named = |thing: &str| {
+            let mut names = scene.contacts.iter().flat_map(|(_, table)| &table.between);
+            names.any(|name| name == "all" || name.split('.').next() == Some(thing))
+        };
+        for (kind, tables) in [("obstacle", &scene.obstacles), ("tool", &scene.tools)] {
+            for (name, _) in tables.iter().filter(|(name, _)| !is_named(name)) {
+                let message = format!("{kind} `{name}` is in no contact, so bodies pass through it");
+                let help = format!("name `{name}` in `between` of a `[contact.NAME]`");
+                let place = scene.source.span(&[kind, name]);
+                found.push(Diagnostic::warning(message).at(place, "touches nothing").help(help));
+            }
+        }
     }
 
     /// Refuses unequal load steps in a scene with several participants.

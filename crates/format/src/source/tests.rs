@@ -149,6 +149,8 @@ fn syntax_errors_have_a_place_and_advice() {
     expect("a = 1\na = 2\n", "`a` is given twice", "a", "remove one");
     expect("[a]\nx = 1\n[a]\nx = 1\ny = 1\n", "`a` is given twice", "a", "remove one");
     expect("element = tet4\n", "`tet4` is not a value", "tet4", "write \"tet4\"");
+    expect("solver = implicit\n", "`implicit` is not a value", "implicit", "write \"implicit\"");
+    expect("curve = nan-hold # c\n", "`nan-hold` is not a value", "nan-hold", "write \"nan-hold\"");
     expect("element = hex8\n", "`hex8` is not a value", "hex8", "write \"hex8\"");
     expect("a = \nb = 2\n", "a value is missing", "", "");
     expect("a = 3,5\n", "not valid TOML", "", "with a point");

@@ -191,7 +191,8 @@ pub enum SolveError {
     /// No equilibrium, with load steps halved as often as allowed.
     #[error(
         "no equilibrium at t = {time:.6} after {} iterations: {}, largest at node {node}{}; try smaller \
-         load steps, displacement control or the dynamic solver",
+         load steps or a smaller `step`, slower motions, `control` in a static run, or a `force-limit` of the tool \
+         that presses",
         residuals.len(), residual_in_words(residuals), in_larger_steps(*broken)
     )]
     NotConverged {

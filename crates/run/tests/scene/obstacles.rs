@@ -231,3 +231,17 @@ fn a_shape_much_larger_than_the_bodies_is_doubted() {
     assert!(doubt.message.contains("times the size of the bodies"), "{}", doubt.message);
     assert!(doubt.help.iter().any(|help| help.contains("0.001")), "{:?}", doubt.help);
 }
+
+/// A warning names each thing that no contact names.
+#[test]
+fn things_that_nothing_touches_are_warned_of() {
+    let needle = "[tool.needle]\nshape = { sphere = { radius = 0.01 } }\nat = [0, 0, 1]\n";
+    let warnings = |text: &str| world(text).unwrap().warnings().map(ToString::to_string).collect::<Vec<_>>();
+    let text = bowl("{ sphere = { radius = 0.05 } }", needle);
+    let found = warnings(&text);
+    assert!(found.len() == 1 && found[0].contains("tool `needle` is in no contact"), "{found:?}");
+    let text = text.replace("['ball', 'bowl']", "['ball', 'needle']");
+    let found = warnings(&text);
+    assert!(found.len() == 1 && found[0].contains("obstacle `bowl` is in no contact"), "{found:?}");
+    assert_eq!(warnings(&text.replace("'needle']", "'all']")), Vec::<String>::new());
+}
