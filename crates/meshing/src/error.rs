@@ -138,7 +138,7 @@ pub enum MeshingError {
         closed: f64,
     },
     /// A closed surface without inside.
-    #[error("the surface encloses nothing: it is flat, or thinner than the cells")]
+    #[error("the surface encloses nothing: it is flat, or thinner than the cells, whose edge is in metres")]
     NothingEnclosed,
     /// The field is NaN or infinite somewhere.
     #[error(

@@ -379,7 +379,6 @@ impl Loaded<'_> {
         let known: Vec<&str> =
             known.chain(rigids.iter().map(|rigid| rigid.name.as_str())).chain(["all"]).collect();
         let help = suggestion(wanted, &known, "the scene", "bodies, obstacles and tools");
-        let help = format!("{help}; both bodies must be in one participant");
         let place = ["0", "1"][side];
         let message = format!("there is no body, obstacle or tool `{wanted}`");
         self.error(&["contact", name, "between", place], message, "no such name", help);

@@ -229,8 +229,8 @@ impl Context<'_> {
             return false;
         }
         if dimension == 3 && mesh.volume_blocks().all(|block| block.is_empty()) {
-            let help = "a solid body needs tets or hexes; this mesh has only surface cells or none. For a thin wall set \
-                        `model = \"shell\"` or `\"membrane\"`";
+            let help = "a solid body needs tets or hexes. To fill a closed surface of a file, add `edge = 0.008, as = \
+                        \"tets\"` to `mesh`; for a thin wall set `model = \"shell\"` or `\"membrane\"`";
             self.error(&place, format!("`{}` has no volume elements", path[1]), "this mesh", help);
             return false;
         }

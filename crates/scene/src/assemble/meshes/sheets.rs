@@ -57,7 +57,11 @@ impl Context<'_> {
         let refused = [
             ("fix", table.fix.is_some(), "`fix` repairs mesh files; shapes need none"),
             ("scale", table.factor() != 1.0, "shapes are given in metres, without `scale`"),
-            ("as", table.cells.is_some(), "this shape is made of triangles"),
+            (
+                "as",
+                table.cells.is_some(),
+                "this shape is a wall of triangles; solids are `block`, `ellipsoid`, `tube` and `organ`",
+            ),
         ];
         for (key, given, message) in refused {
             if given {
