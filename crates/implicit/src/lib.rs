@@ -18,7 +18,7 @@
 //!
 //! // A strip of 1 m × 0.1 m × 10 mm in ten squares, clamped at x = 0, lifted at its other end.
 //! let points = (0..22).map(|i| Vector3::new(f64::from(i / 2) * 0.1, f64::from(i % 2) * 0.1, 0.0));
-//! let square = |i| [[2 * i, 2 * i + 2, 2 * i + 3], [2 * i, 2 * i + 3, 2 * i + 1]];
+//! let square = |i: u32| [[2 * i, 2 * i + 2, 2 * i + 3], [2 * i, 2 * i + 3, 2 * i + 1]];
 //! let cells = (0..10).flat_map(square).collect();
 //! let material = Wall { elastic: Elasticity { young: 1e6, poisson: 0.3 }, density: 1000.0 };
 //! let mut model = Assembly::new("strip", points);

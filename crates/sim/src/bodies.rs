@@ -6,7 +6,8 @@ use std::sync::Arc;
 use pliant_implicit::{Assembly, AssemblyState, CurvedSurface};
 use pliant_mechanics::fingerprint;
 
-/// Bodies of the implicit solvers, on the nodes of [`Part::model`](crate::ParticipantSetup::model).
+/// Bodies of the implicit solvers, on the nodes of the model of a
+/// [`ParticipantSetup`](crate::ParticipantSetup).
 #[derive(Clone, Debug)]
 pub struct ImplicitBodies {
     /// Their shells, with the model of their nodes.

@@ -49,7 +49,7 @@ pub fn pose_of([x, y, z]: [f64; 3], quaternion: [f64; 4]) -> Option<Pose> {
 /// use pliant_sim::contact::pose::{Trajectory, Pose};
 /// use pliant_sim::contact::shape::Shape;
 /// use pliant_sim::contact::touch::{Contact, Contacts, Rigid, Touch, With};
-/// use pliant_sim::{Method, Part, Simulation};
+/// use pliant_sim::{Method, ParticipantSetup, Simulation};
 ///
 /// // A tetrahedron on a held face, and a ball above its tip.
 /// let mut model = Model::default();
@@ -58,7 +58,7 @@ pub fn pose_of([x, y, z]: [f64; 3], quaternion: [f64; 4]) -> Option<Pose> {
 /// let cells = Cells::tet4(vec![[0, 1, 2, 3]], &model.rest);
 /// model.add_solid(Solid::new(tet, Material::elastic(law, 1000.0), cells));
 /// model.fix("base", vec![0, 1, 2]);
-/// let mut part = Part::explicit("tet", model, 1.0)?;
+/// let mut part = ParticipantSetup::explicit("tet", model, 1.0)?;
 /// let above = Pose::translation(0.0, 0.0, 0.12);
 /// let ball = Rigid {
 ///     name: "ball".into(),

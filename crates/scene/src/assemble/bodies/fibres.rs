@@ -457,7 +457,10 @@ mod tests {
         let below = "{ box = [[0, 0, 0], [0.04, 0.04, 0.01]] }";
         let says =
             refused(&hexes, &format!("{{ laplace = {{ from = {below}, to = {{ set = 'z-max' }} }} }}"));
-        assert!(says.contains("is flat: hex 0, hex 1,") && says.contains("… (16 in all"), "{says}");
+        assert!(
+            says.contains("equation is constant: hex 0, hex 1,") && says.contains("… (16 in all"),
+            "{says}"
+        );
     }
 
     #[test]
