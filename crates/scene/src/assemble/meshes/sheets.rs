@@ -188,7 +188,7 @@ mod tests {
                 "overall diameter beyond the optic is -0.001",
             ),
             ("{ plate = { size = [1, 1], cells = [0, 2] } }", "the number of cells along x is 0"),
-            ("{ plate = { size = [1, 1], cells = [2, 2] }, as = 'hexes' }", "made of triangles"),
+            ("{ plate = { size = [1, 1], cells = [2, 2] }, as = 'hexes' }", "a wall of triangles"),
             ("{ plate = { size = [1, -1], cells = [2, 2] } }", "size along y is -1"),
             ("{ sphere = { radius = 1, levels = 40 } }", "exceed the limit"),
             ("{ cylinder = { radius = 1, length = 1, span = 400 }, edge = 1 }", "span"),
