@@ -586,12 +586,11 @@ fn syntax_error(error: &toml::de::Error, text: &str) -> Diagnostic {
     if value_expected && found.is_empty() {
         return Diagnostic::error("a value is missing").at(span, "expected a value here");
     }
-    if value_expected && found.chars().all(|c| c.is_alphanumeric() || "-_./".contains(c)) {
-        return Diagnostic::error(format!("`{found}` is not a value"))
-            .at(span, "a text needs quotes")
-            .help(format!("write \"{found}\""));
-    }
-    if let Some((word, at)) = unquoted(text, span.start) {
+    let word = match value_expected && found.chars().all(is_of_word) {
+        true => Some((found, span.clone())),
+        false => unquoted(text, span.start),
+    };
+    if let Some((word, at)) = word {
         return Diagnostic::error(format!("`{word}` is not a value"))
             .at(at, "a text needs quotes")
             .help(format!("write \"{word}\""));
@@ -621,14 +620,18 @@ fn syntax_error(error: &toml::de::Error, text: &str) -> Diagnostic {
     }
 }
 
+/// True for the characters of words, file names and numbers.
+fn is_of_word(c: char) -> bool {
+    c.is_alphanumeric() || "-_./".contains(c)
+}
+
 /// A word without quotes that is the whole value of the line with a mistake, and its place.
 fn unquoted(text: &str, at: usize) -> Option<(&str, Range<usize>)> {
     let start = text.get(..at)?.rfind('\n').map_or(0, |end| end + 1);
     let line = text[start..].lines().next()?;
     let (key, value) = line.split_once('=')?;
     let word = value.split('#').next()?.trim();
-    let is_word = word.starts_with(char::is_alphabetic)
-        && word.chars().all(|c| c.is_alphanumeric() || "-_./".contains(c));
+    let is_word = word.starts_with(char::is_alphabetic) && word.chars().all(is_of_word);
     let begin = start + key.len() + 1 + value.find(word)?;
     (is_word && at >= begin && !["true", "false", "inf", "nan"].contains(&word))
         .then(|| (word, begin..begin + word.len()))
